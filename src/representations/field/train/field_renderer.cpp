@@ -100,8 +100,7 @@ std::string FieldRenderer::device() const {
 
 RoundCounts FieldRenderer::renderPiece(const ImageRays::Piece& piece) {
   const RadianceField::Output output =
-      model_.render({piece.rays, piece.origins, piece.directions, {}, piece.far},
-                    seenCells_.size() > 0 ? seenCells_.all() : model_.occupancy().bits(), kMinTransmittance, seen_);
+      model_.render({piece.rays, piece.origins, piece.directions, {}, piece.far}, cells(), kMinTransmittance, seen_);
   CompositeForward composite;
   composite.minTransmittance = kMinTransmittance;
   composite.rays = seen_.finished(piece.rays);
@@ -124,7 +123,7 @@ RoundCounts FieldRenderer::renderPiece(const ImageRays::Piece& piece) {
 
 void FieldRenderer::cullUnseen(const Capture& capture, const CullOptions& options) {
   SeenCells seen(*this, options);
-  PhotoVisitor(capture, model_.frame(), kRays, seen).visitAll(1, {}, [](int64_t, int64_t) {});
+  PhotoVisitor(capture, model_.frame(), kRays, seen).visitAll(options.stride, {}, [](int64_t, int64_t) {});
   for (int i = 0; i < options.dilation; ++i) seen.marked = dilated(seen.marked, model_.space().gridResolution);
   std::vector<uint32_t> bits = model_.occupancy().bitWords();
   for (size_t i = 0; i < seen.marked.size(); ++i) {

@@ -22,6 +22,9 @@ class FieldRenderer final : public ViewRenderer {
   // Throws Error if a mask cannot be read.
   void cullUnseen(const Capture& capture, const CullOptions& options);
 
+  // The cells that rays march through, as OccupancyGrid::bits.
+  Slice<const uint32_t> cells() const { return seenCells_.size() > 0 ? seenCells_.all() : model_.occupancy().bits(); }
+
   static constexpr float kMinTransmittance = 1e-3f;  // rays end below this transmittance
   // Return the numbers of samples whose densities, and whose colours, were evaluated so far, cullUnseen included.
   uint64_t densitiesEvaluated() const { return densities_; }

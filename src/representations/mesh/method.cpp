@@ -1,0 +1,43 @@
+#include "representations/mesh/method.h"
+
+#include "representations/mesh/train/mesh_renderer.h"
+#include "representations/mesh/train/train_mesh.h"
+
+namespace tessera {
+namespace {
+
+TrainingResult train(Device& device, const Capture& capture, const fs::path& model, const MethodSettings& settings,
+                     const BlockRunOptions& options) {
+  return trainMesh(device, capture, model, {SettingsOf<MeshConfig>::in(settings), options.loop});
+}
+
+std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
+  auto model = loadMeshModel(device, folder);
+  auto renderer = std::make_unique<MeshRenderer>(*model);
+  return std::make_unique<ModelWithRenderer<MeshModel, MeshRenderer>>(std::move(model), std::move(renderer));
+}
+
+std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& settings) {
+  const MeshConfig& config = SettingsOf<MeshConfig>::in(settings);
+  const MeshFieldShape shape = config.shape();
+  return {{"parameters", shape.grid.parameters() + shape.encoder.parameters() + shape.decoder.parameters()},
+          {"vertices", config.grid().cells()},
+          {"multiply_accumulates_per_sample", 8 * shape.grid.columns() + countMultiplyAccumulates(shape.encoder)},
+          {"view_dependent_multiply_accumulates_per_sample", countMultiplyAccumulates(shape.decoder)}};
+}
+
+}  // namespace
+
+const Method& meshMethod() {
+  static const Method kMethod = {
+      .name = "mesh",
+      .summary = "triangles whose colours a small network decodes (UE4-NeRF)",
+      .settings = makeSettings<MeshConfig>,
+      .train = train,
+      .openModel = openModel,
+      .describe = describe,
+  };
+  return kMethod;
+}
+
+}  // namespace tessera

@@ -1,0 +1,63 @@
+// Every setting of the `mesh` representation: flag (`--set`), default, help and the line in config.toml.
+#pragma once
+
+#include "compute/octahedra.h"
+#include "compute/rays.h"
+#include "representations/mesh/train/mesh_field.h"
+#include "train/settings/learning_rate.h"
+#include "train/settings/losses.h"
+#include "train/settings/networks.h"
+#include "train/settings/occupancy.h"
+#include "train/settings/rays.h"
+
+namespace tessera {
+
+struct MeshConfig : RaySettings,
+                    RandomBackgroundSettings,
+                    SampleBudgetSettings,
+                    HashGridSettings,
+                    NetworkSettings,
+                    HiddenLayerSettings,
+                    OccupancySettings,
+                    LearningRateSettings,
+                    PhotoLossSettings,
+                    DistortionSettings {
+  // Scene
+  SETTING(double, roiMargin, 1.0, "roi_margin", "region of interest relative to the one fitted to the capture",
+          within(1e-6, 1e6));
+  SETTING(int64_t, coarseSteps, 1500, "coarse_steps",
+          "steps of the coarse field, which finds the surfaces that triangles start at", within(1, 1 << 30));
+  // Model
+  SETTING(int, gridFeatures, 2, "grid_features", "features per hash entry", allowedValues({1, 2, 4, 8}));
+  SETTING(int, meshCells, 64, "mesh_cells", "cells along an edge of the grid of octahedra",
+          within(4, 256).withDivisor(4, 0));
+  SETTING(bool, everyCell, false, "every_cell",
+          "every cell carries an octahedron, as the paper's text says; else every second one, so that none overlap",
+          anything());
+  SETTING(double, opacityOffset, -6, "opacity_offset", "added to the logit of opacity; nearly transparent at the start",
+          within(-20, 20));
+  // Training
+  SETTING(double, occupancyDecay, 0.8, "occupancy_decay",
+          "what remains of a cell's occupancy after an update unless a ray reaches a hit in it", share());
+  SETTING(double, vertexLearningRate, 8e-3, "vertex_learning_rate",
+          "learning rate of the vertices, in edges of a cell; falls to a hundredth", atLeast(0));
+  SETTING(int, vertexStartSteps, 500, "vertex_start_steps", "steps before the vertices begin to move",
+          within(0, 1 << 30));
+  SETTING(double, minCosine, 0.1, "min_cosine",
+          "a vertex is moved as if no ray hit its faces at a flatter angle than this cosine", share());
+  SETTING(bool, opaqueLoss, true, "opaque_loss", "the second loss, which makes surfaces opaque", anything());
+
+  MeshConfig();
+  // In the order of config.toml.
+  std::vector<ConfigField> fields();
+  // Throws Error that names the first invalid setting.
+  void check() const;
+
+  MeshFieldShape shape() const;
+  // The grid of octahedra that fills the region of interest, [-1,1]³.
+  OctahedraGrid grid() const;
+  // The space of the occupancy, in which exp of an opacity's logit is compared with a threshold.
+  MarchSpace space() const;
+};
+
+}  // namespace tessera

@@ -1,0 +1,91 @@
+#include "representations/mesh/train/mesh_field.h"
+
+#include "compute/encodings.h"
+#include "field/initial_values.h"
+
+namespace tessera {
+
+MeshFieldShape makeMeshFieldShape(const HashGridOptions& grid, int encoderWidth, int encoderHidden) {
+  MeshFieldShape shape{HashGrid(grid), {}, {}};
+  shape.encoder.inputs = static_cast<int>(shape.grid.columns());
+  shape.encoder.width = encoderWidth;
+  shape.encoder.hiddenLayers = encoderHidden;
+  shape.encoder.outputs = MeshField::kFeatures;
+  shape.decoder.inputs = MeshField::kFeatures + shape.harmonicsDegree * shape.harmonicsDegree;
+  shape.decoder.width = 16;
+  shape.decoder.hiddenLayers = 2;
+  shape.decoder.outputs = 3;
+  shape.decoder.activation = OutputActivation::sigmoid;
+  return shape;
+}
+
+MeshField::MeshField(Device& device, MeshFieldShape shape, uint64_t seed)
+    : device_(device),
+      shape_(std::move(shape)),
+      table_(device, "table", initialTable(shape_.grid.parameters(), seed)),
+      encoder_(device, "encoder", initialWeights(shape_.encoder, seed, 0xe0)),
+      decoder_(device, "decoder", initialWeights(shape_.decoder, seed, 0xde)) {}
+
+void MeshField::reserve(uint32_t samples) {
+  if (samples <= capacity_) return;
+  capacity_ = samples;
+  const size_t n = samples, inputs = static_cast<size_t>(shape_.decoder.inputs);
+  for (Array<float>* encodings : {&encoded_, &encodedGradients_}) {
+    *encodings = device_.array<float>(Matrix<float>::rowsOfPlane(n) * shape_.grid.columns());
+  }
+  for (Array<float>* rows : {&decoderInput_, &decoderInputGradients_}) *rows = device_.array<float>(n * inputs);
+  colours_ = device_.array<float>(n * 3);
+  encoderActivations_ = device_.allocateActivations(shape_.encoder, n);
+  decoderActivations_ = device_.allocateActivations(shape_.decoder, n);
+}
+
+Matrix<float> MeshField::byLevel(Array<float>& encodings) {
+  return Matrix<float>::grouped(encodings, shape_.grid.columns(), static_cast<uint32_t>(shape_.grid.features),
+                                Matrix<float>::rowsOfPlane(capacity_));
+}
+
+void MeshField::encode(Count samples, Slice<const float> positions, Matrix<float> features) {
+  CHECK(samples.capacity <= capacity_);
+  device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, byLevel(encoded_)});
+  device_.run(MlpForward{shape_.encoder, samples, byLevel(encoded_), encoder_.values, features, {}});
+}
+
+MeshField::Output MeshField::forward(Count samples, Slice<const float> positions, Slice<const float> directions,
+                                     Slice<const uint32_t> rayOfSample, bool forBackward) {
+  CHECK(samples.capacity <= capacity_);
+  const auto activations = [&](Array<float>& all) { return forBackward ? all.all() : Slice<float>(); };
+  device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, byLevel(encoded_)});
+  device_.run(MlpForward{shape_.encoder, samples, byLevel(encoded_), encoder_.values, features(),
+                         activations(encoderActivations_)});
+  const Matrix<float> input(decoderInput_, static_cast<uint32_t>(shape_.decoder.inputs));
+  const uint32_t harmonics = static_cast<uint32_t>(shape_.harmonicsDegree * shape_.harmonicsDegree);
+  device_.run(SphericalHarmonicsForward{shape_.harmonicsDegree, samples, directions, rayOfSample,
+                                        input.columnRange(kFeatures, harmonics)});
+  device_.run(MlpForward{shape_.decoder, samples, input, decoder_.values, Matrix<float>(colours_, 3),
+                         activations(decoderActivations_)});
+  return {features().columnRange(0, 1), Matrix<float>(colours_, 3)};
+}
+
+void MeshField::backward(Count samples, Slice<const float> positions, Slice<const float> logitGradients,
+                         Matrix<const float> colourGradients, Slice<float> positionGradients) {
+  const uint32_t inputs = static_cast<uint32_t>(shape_.decoder.inputs);
+  const Matrix<float> input(decoderInput_, inputs), inputGradients(decoderInputGradients_, inputs);
+  device_.run(MlpBackward{shape_.decoder,
+                          samples,
+                          input,
+                          decoder_.values,
+                          Matrix<float>(colours_, 3),
+                          decoderActivations_,
+                          colourGradients,
+                          {},
+                          decoder_.gradients,
+                          inputGradients});
+  const Matrix<float> encodedGradients = byLevel(encodedGradients_);
+  device_.run(MlpBackward{shape_.encoder, samples, byLevel(encoded_), encoder_.values, features(), encoderActivations_,
+                          inputGradients.columnRange(0, kFeatures), logitGradients, encoder_.gradients,
+                          encodedGradients});
+  device_.run(HashGridBackward{shape_.grid, samples, positions, table_.values, encodedGradients, table_.gradients,
+                               positionGradients});
+}
+
+}  // namespace tessera

@@ -1,0 +1,44 @@
+// One training step of the `mesh` representation: rays → hits on octahedra → field → two images → losses → gradients →
+// Adam.
+#pragma once
+
+#include "representations/mesh/train/mesh_model.h"
+#include "representations/mesh/train/mesh_start.h"
+#include "train/photo_loss.h"
+#include "train/ray_budget.h"
+#include "train/training_loop.h"
+
+namespace tessera {
+
+class MeshTrainer final : public TrainableModel {
+ public:
+  // Keeps references to `device` and `capture`. Trains on the capture's training photos.
+  MeshTrainer(Device& device, const Capture& capture, const MeshConfig& config, const SceneFrame& frame,
+              MeshStart start);
+
+  StepReport step(int64_t step, int64_t plannedSteps) override;
+  Bytes save(uint32_t part) override;
+  void restore(uint32_t part, const fs::path& path, const Safetensors& state) override;
+  std::optional<uint32_t> firstNonFinitePart() override;
+
+  MeshModel& model() { return model_; }
+
+ private:
+  void refreshOccupancy(int64_t step);
+  void addGradients(int64_t step, int64_t plannedSteps);
+  void updateParameters(int64_t step, int64_t plannedSteps);
+
+  Device& device_;
+  MeshConfig config_;
+  MeshModel model_;
+  PhotoRays photoRays_;
+  PhotoLoss photoLoss_;
+  RayBudget budget_;
+  MeshHits hits_;
+  Array<uint32_t> counters_;
+  Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, losses_;
+  Array<float> sampleWeights_, sampleSteps_, weightGradients_, logitGradients_, sampleColourGradients_,
+      positionGradients_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,210 @@
+#include "representations/mesh/train/mesh_trainer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "representations/field/testing/trained_cube.h"
+#include "representations/mesh/train/mesh_renderer.h"
+
+namespace tessera {
+namespace {
+
+// A model that is small enough to train within seconds.
+MeshConfig smallMeshConfig() {
+  MeshConfig config;
+  config.gridLevels = 6;
+  config.gridLog2Size = 13;
+  config.gridBase = 8;
+  config.gridFinest = 96;
+  config.width = 16;
+  config.meshCells = 16;
+  config.occupancyWarmupSteps = 64;
+  config.occupancyEvery = 8;
+  config.vertexStartSteps = 40;
+  config.samplesPerStep = 16384;
+  config.maxRays = 4096;
+  config.learningRate = 2e-2;
+  config.exposure = false;
+  return config;
+}
+
+// Training that starts everywhere, from all pixels.
+MeshStart startEverywhere(const CubeScene& scene, const MeshConfig& config) {
+  MeshStart start;
+  start.cells.assign(config.grid().cells(), true);
+  start.tiles.resize(scene.capture().photos.size());
+  for (const int photo : scene.capture().photosIn(Split::train))
+    start.tiles[photo] = {{{photo, 0, 0, CubeScene::kWidth, CubeScene::kHeight}},
+                          {1.0 * CubeScene::kWidth * CubeScene::kHeight}};
+  return start;
+}
+
+struct TrainedMesh {
+  std::unique_ptr<Device> device;
+  std::unique_ptr<MeshTrainer> trainer;
+  StepReport last;
+
+  TrainedMesh(const CubeScene& scene, const MeshConfig& config, int64_t steps, int threads = 2)
+      : device(makeDevice({"cpu", threads})),
+        trainer(std::make_unique<MeshTrainer>(*device, scene.capture(), config, fitSceneFrame(scene.capture(), 0.5),
+                                              startEverywhere(scene, config))) {
+    for (int64_t step = 0; step < steps; ++step) last = trainer->step(step, steps);
+  }
+};
+
+double heldOutPsnr(const CubeScene& scene, MeshModel& model) {
+  MeshRenderer renderer(model);
+  double sum = 0;
+  const std::vector<int> photos = scene.capture().photosIn(Split::test);
+  for (const int index : photos) {
+    const Photo& photo = scene.capture().photos[index];
+    const Camera& camera = scene.capture().cameras[photo.camera];
+    sum += computePsnr(renderer.render(camera, photo.worldFromCamera, nullptr),
+                       scene.truth(camera, photo.worldFromCamera));
+  }
+  return sum / static_cast<double>(photos.size());
+}
+
+TEST(MeshTrainer, LearnsWhatHeldOutPhotosSee) {
+  const CubeScene scene;
+  TrainedMesh trained(scene, smallMeshConfig(), 400);
+  EXPECT_GT(heldOutPsnr(scene, trained.trainer->model()), 17);
+}
+
+TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {
+  const CubeScene scene;
+  MeshConfig still = smallMeshConfig();
+  still.vertexLearningRate = 0;
+  TrainedMesh moved(scene, smallMeshConfig(), 400), unmoved(scene, still, 400);
+  EXPECT_GT(heldOutPsnr(scene, moved.trainer->model()), heldOutPsnr(scene, unmoved.trainer->model()));
+  double largest = 0;
+  for (const float d : moved.device->read(moved.trainer->model().displacements().values.all()))
+    largest = std::max(largest, std::abs(double{d}));
+  EXPECT_GT(largest, 0.1);
+  EXPECT_LE(largest, 0.5);
+  for (const float d : unmoved.device->read(unmoved.trainer->model().displacements().values.all())) ASSERT_EQ(d, 0);
+}
+
+TEST(MeshTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
+  const CubeScene scene;
+  const Bytes one = TrainedMesh(scene, smallMeshConfig(), 90, 1).trainer->save(0);
+  EXPECT_EQ(one, TrainedMesh(scene, smallMeshConfig(), 90, 2).trainer->save(0));
+  EXPECT_EQ(one, TrainedMesh(scene, smallMeshConfig(), 90, 5).trainer->save(0));
+}
+
+TEST(MeshTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
+  const CubeScene scene;
+  constexpr int64_t kSteps = 90;
+  TrainedMesh unbroken(scene, smallMeshConfig(), kSteps);
+  Bytes state;
+  int64_t step = 0;
+  for (const int64_t until : {0, 1, 15, 17, 64, 65, 72, 90}) {
+    TrainedMesh part(scene, smallMeshConfig(), 0);
+    if (!state.empty()) {
+      const auto file = decodeSafetensors(state);
+      ASSERT_TRUE(file);
+      part.trainer->restore(0, "state", *file);
+    }
+    for (; step < until; ++step) part.trainer->step(step, kSteps);
+    state = part.trainer->save(0);
+  }
+  EXPECT_EQ(state, unbroken.trainer->save(0));
+}
+
+TEST(MeshStart, FindsTheCellsAndPixelsOfSurfacesInTheRegion) {
+  const CubeScene scene;
+  TrainedCube coarse(scene, cubeConfig(), 300);
+  MeshConfig config = smallMeshConfig();
+  config.meshCells = 32;
+  const MeshStart start = findMeshStart(scene.capture(), coarse.trainer->model(), config);
+  const SceneFrame& frame = coarse.frame;
+  // Every point of the cube's surface lies in such a cell; few other cells are marked.
+  size_t marked = 0;
+  for (const bool cell : start.cells) marked += cell;
+  EXPECT_LT(marked, start.cells.size() / 2);
+  const auto cellAt = [&](const Vec3d& world) {
+    const Vec3d g = (frame.sceneFromWorld(world) + Vec3d::Ones()) * (config.meshCells / 2.0);
+    const auto place = [&](double x) { return static_cast<size_t>(std::clamp(x, 0.0, config.meshCells - 1.0)); };
+    const size_t n = static_cast<size_t>(config.meshCells);
+    return place(g.x()) + n * (place(g.y()) + n * place(g.z()));
+  };
+  int missing = 0, all = 0;
+  for (const double u : {-0.45, -0.2, 0.0, 0.25, 0.45})
+    for (const double v : {-0.4, -0.1, 0.15, 0.4})
+      for (int axis = 0; axis < 3; ++axis)
+        for (const double side : {-0.5, 0.5}) {
+          Vec3d at;
+          at[axis] = side;
+          at[(axis + 1) % 3] = u;
+          at[(axis + 2) % 3] = v;
+          ++all;
+          missing += !start.cells[cellAt(CubeScene::centre() + at)];
+        }
+  EXPECT_LE(missing, all / 20);
+  // Photos are transparent around the cube, so only the tiles on it are used.
+  for (const int photo : scene.capture().photosIn(Split::train)) {
+    const double share = start.tiles[photo].total() / (CubeScene::kWidth * CubeScene::kHeight);
+    EXPECT_GT(share, 0.1) << photo;
+    EXPECT_LT(share, 1) << photo;
+  }
+  for (const int photo : scene.capture().photosIn(Split::test)) EXPECT_TRUE(start.tiles[photo].tiles.empty());
+}
+
+TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
+  const auto device = makeDevice({"cpu", 1});
+  MeshConfig config = smallMeshConfig();
+  config.opacityOffset = 0;
+  config.everyCell = true;
+  MeshModel model(*device, config, {});
+  model.exclude(std::vector<bool>(config.grid().cells(), true));
+  // One ray straight down through the middle of a column of cells, whose first hit is opaque and the second is not.
+  const Array<float> origins = device->uploadArray(std::vector<float>{0.07f, 0.05f, 3}),
+                     directions = device->uploadArray(std::vector<float>{0, 0, -1});
+  const MeshModel::Rays rays{1, origins, directions, {}};
+  constexpr uint32_t kMaxHits = 200;
+  MeshHits hits(*device, 1, kMaxHits);
+  Array<uint32_t> counters = device->array<uint32_t>(MeshHits::kCounters);
+  hits.counters = counters;
+  std::vector<float> logits(kMaxHits, 5);
+  logits[0] = 0;  // half opaque; the second hit leaves a transmittance below a hundredth
+  const Array<float> opacities = device->uploadArray(logits);
+  model.trace(rays, kMaxHits, hits);
+  const uint32_t all = device->read(counters.all())[0];
+  ASSERT_GT(all, 20u);
+  const std::vector<float> positions = device->read(hits.positions.part(0, size_t{3} * all));
+  for (int update = 0; update < 40; ++update) {
+    model.addOccupancy(rays, hits, Matrix<const float>(opacities.all(), 1));
+    model.refreshOccupancy();
+  }
+  std::vector<uint32_t> expected(config.grid().words());
+  for (const uint32_t reached : {0u, 1u}) {
+    uint32_t cell = 0;
+    for (int axis = 2; axis >= 0; --axis) {
+      const uint32_t n = static_cast<uint32_t>(config.meshCells);
+      cell = cell * n + static_cast<uint32_t>(positions[3 * size_t{reached} + axis] * static_cast<float>(n));
+    }
+    expected[cell / 32] |= 1u << cell % 32;
+  }
+  EXPECT_EQ(model.occupancy().bitWords(), expected);
+  model.trace(rays, kMaxHits, hits);
+  EXPECT_LT(device->read(counters.all())[0], all / 2) << "hits beyond the surface and its neighbours";
+}
+
+TEST(MeshModel, DilatesCellsByOneInAllDirections) {
+  constexpr uint32_t kCells = 6;
+  std::vector<uint32_t> bits((kCells * kCells * kCells + 31) / 32);
+  const auto index = [](uint32_t x, uint32_t y, uint32_t z) { return x + kCells * (y + kCells * z); };
+  for (const uint32_t cell : {index(2, 3, 3), index(5, 0, 0)}) bits[cell / 32] |= 1u << cell % 32;
+  const std::vector<uint32_t> dilated = dilateCells(bits, kCells);
+  for (uint32_t z = 0; z < kCells; ++z)
+    for (uint32_t y = 0; y < kCells; ++y)
+      for (uint32_t x = 0; x < kCells; ++x) {
+        const bool beside = (x >= 1 && x <= 3 && y >= 2 && y <= 4 && z >= 2 && z <= 4) || (x >= 4 && y <= 1 && z <= 1);
+        EXPECT_EQ(dilated[index(x, y, z) / 32] >> index(x, y, z) % 32 & 1, beside) << x << " " << y << " " << z;
+      }
+}
+
+}  // namespace
+}  // namespace tessera
