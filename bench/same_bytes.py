@@ -2,7 +2,7 @@
 
 Checkpoints are compared byte for byte, config.toml without its comments. Tiles are compared by the contents of buffer views and
 by JSON without the names and lengths of files: names contain a digest of the bytes. Keys that were renamed
-(src/base/former_settings.cpp) count as the same.
+(settings: src/base/former_settings.cpp; JSON: renamedKeys) count as the same.
 """
 import json
 import re
@@ -12,6 +12,7 @@ from pathlib import Path
 
 before, after = Path(sys.argv[1]), Path(sys.argv[2])
 failures = 0
+renamedKeys = {"surround": "background_block", "whole": "learned_background"}
 renamed = dict(re.findall(r'{"(\w+)", "(\w+)"}', Path("src/base/former_settings.cpp").read_text()))
 
 
@@ -59,7 +60,7 @@ def neutral(value):
     """Returns the JSON without the names and the lengths of files."""
     if isinstance(value, dict):
         names = ("uri", "byteLength", "byteOffset", "bytes")
-        return {"background_block" if k == "surround" else k: neutral(v) for k, v in value.items() if k not in names}
+        return {renamedKeys.get(k, k): neutral(v) for k, v in value.items() if k not in names}
     if isinstance(value, list):
         return [neutral(v) for v in value]
     return value
