@@ -52,5 +52,18 @@ struct OctahedraBackwardArguments {
 };
 TESSERA_SIZE(OctahedraBackwardArguments, 176);
 
+struct MergeOctahedraArguments {
+  uint resolution;
+  uint points;
+  uint listed;
+  float offset;
+  UintPointer cells;
+  MatrixArguments x;
+  FloatPointer displacements;
+  FloatPointer opacities;
+  FloatPointer merged;
+};
+TESSERA_SIZE(MergeOctahedraArguments, 72);
+
 TESSERA_END_ARGUMENTS
 #endif

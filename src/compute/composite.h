@@ -67,7 +67,7 @@ struct CompositeBackward {
 };
 TESSERA_OPERATION(CompositeBackward);
 
-// Compositing of the second loss of UE4-NeRF (Xu et al. 2023, equations 4 to 6), which prepares surfaces for
+// Compositing of the second loss of UE4-NeRF (Gu et al. 2023, equations 4 to 6), which prepares surfaces for
 // rasterisers: only samples with α > threshold count, a ray ends after the sample that takes its opacity A = Σ w above
 // `maxOpacity`, and its colour is normalised, Σ w c / A. A ray with A < minOpacity has colour and opacity zero, and no
 // gradients. α is 1 / (1 + exp(-x - offset)).

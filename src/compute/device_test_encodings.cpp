@@ -75,9 +75,11 @@ OperationTests makeTests<HashGridBackward>() {
   OperationTests tests;
   for (const NamedGrid& named : grids())
     for (const Size& size : kRowSizes)
-      for (bool withPositions : {false, true})
+      for (int optional = 0; optional < 3; ++optional) {
+        const bool withPositions = optional > 0, onlyPositions = optional == 2;
         tests.cases.push_back(
-            {fmt::format("{}, samples {}{}", named.name, toString(size), withPositions ? ", position gradients" : ""),
+            {fmt::format("{}, samples {}{}{}", named.name, toString(size), withPositions ? ", position gradients" : "",
+                         onlyPositions ? " only" : ""),
              [=](Stage& stage) {
                const HashGrid& grid = named.grid;
                const size_t rows = size.capacity;
@@ -88,9 +90,11 @@ OperationTests makeTests<HashGridBackward>() {
                    grid, stage.count(size), stage.input(positions),
                    withPositions ? stage.randomInput(grid.parameters(), -1, 1) : Slice<float>(),
                    groupedByLevel(stage.randomInput(rows * grid.columns(), -1, 1), grid, rows),
-                   stage.output("tableGradients", stage.random.floats(grid.parameters(), -1, 1), 5e-4),
+                   onlyPositions ? Slice<float>()
+                                 : stage.output("tableGradients", stage.random.floats(grid.parameters(), -1, 1), 5e-4),
                    withPositions ? stage.output("positionGradients", 3 * rows, 1e-3) : Slice<float>()});
              }});
+      }
   for (const NamedGrid& named : grids())
     tests.gradients.push_back(
         {named.name, [=](Stage& stage) {

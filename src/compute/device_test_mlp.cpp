@@ -88,11 +88,11 @@ OperationTests makeTests<MlpBackward>() {
   tests.inHalves = true;
   for (const NetworkCase& network : networks())
     for (const Size& size : kRowSizes)
-      for (int optional = 0; optional < 4; ++optional) {
-        const bool withFirst = optional & 1, withInput = optional & 2;
+      for (int optional = 0; optional < 5; ++optional) {
+        const bool withFirst = optional & 1, onlyInput = optional == 4, withInput = onlyInput || optional & 2;
         tests.cases.push_back(
-            {fmt::format("{}, samples {}{}{}", network.name(), toString(size), withFirst ? ", first output" : "",
-                         withInput ? ", input gradients" : ""),
+            {fmt::format("{}, samples {}{}{}{}", network.name(), toString(size), withFirst ? ", first output" : "",
+                         withInput ? ", input gradients" : "", onlyInput ? " only" : ""),
              [=](Stage& stage) {
                const MlpShape& shape = network.shape;
                const Network saved(stage.random, shape, size.capacity);
@@ -102,7 +102,8 @@ OperationTests makeTests<MlpBackward>() {
                    stage.keptInput(saved.activations),
                    stage.randomMatrix(size.capacity, shape.outputs, network.output, -1, 1),
                    withFirst ? stage.randomInput(size.capacity, -1, 1) : Slice<float>(),
-                   stage.output("weightGradients", stage.random.floats(shape.parameters(), -1, 1)),
+                   onlyInput ? Slice<float>()
+                             : stage.output("weightGradients", stage.random.floats(shape.parameters(), -1, 1)),
                    withInput ? stage.outputMatrix("inputGradients", size.capacity, shape.inputs, network.input)
                              : Matrix<float>()});
              }});

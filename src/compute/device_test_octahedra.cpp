@@ -274,4 +274,40 @@ OperationTests makeTests<OctahedraBackward>() {
   return tests;
 }
 
+template <>
+OperationTests makeTests<MergeOctahedra>() {
+  OperationTests tests;
+  tests.noGradient = "it makes the parameters of another level";
+  for (const uint32_t resolution : {2u, 6u, 16u})
+    for (const uint32_t points : {1u, 5u})
+      for (const Layout layout : {Layout::plain, Layout::strided})
+        tests.cases.push_back(
+            {fmt::format("{} cells, {} points{}", resolution, points, layout == Layout::plain ? "" : ", strided"),
+             [=](Stage& stage) {
+               const OctahedraGrid grid{resolution};
+               std::vector<uint32_t> cells;
+               for (uint32_t cell = 0; cell < grid.cells(); ++cell)
+                 if (stage.random.below(3) > 0) cells.push_back(cell);
+               // Opacities on a lattice, so that rounding cannot choose between two of nearly the same opacity, but
+               // some are equal; and transparent ones.
+               std::vector<float> logits(points * cells.size());
+               for (size_t i = 0; i < cells.size(); ++i) {
+                 const float logit =
+                     stage.random.below(3) == 0 ? -20.0f : 0.25f * static_cast<float>(stage.random.below(20));
+                 for (size_t p = 0; p < points; ++p) logits[p * cells.size() + i] = logit;
+               }
+               MergeOctahedra a;
+               a.resolution = resolution;
+               a.points = points;
+               a.offset = -2;
+               a.cells = stage.input(cells);
+               a.x = stage.makeMatrix(logits, 1, layout);
+               a.displacements = stage.input(randomDisplacements(stage.random, grid, 1));
+               a.opacities = stage.output("opacities", grid.cells(), 1e-6);
+               a.mergedDisplacements = stage.output("mergedDisplacements", size_t{3} * grid.cells() / 8, 1e-6);
+               stage.device.run(a);
+             }});
+  return tests;
+}
+
 }  // namespace tessera::device_test

@@ -58,14 +58,14 @@ struct HashGridForward {
 };
 TESSERA_OPERATION(HashGridForward);
 
-// Adds to `tableGradients`; overwrites `positionGradients`.
+// Adds to `tableGradients`; overwrites `positionGradients`. At least one of them is given.
 struct HashGridBackward {
   const HashGrid& grid;
   Count samples;
   Slice<const float> positions;
   Slice<const float> table;              // read only for position gradients
   Matrix<const float> encodedGradients;  // same layout as `encoded`
-  Slice<float> tableGradients;           // [grid.entries()][features]
+  Slice<float> tableGradients;           // optional, [grid.entries()][features]
   Slice<float> positionGradients;        // optional, [capacity][3]
 };
 TESSERA_OPERATION(HashGridBackward);

@@ -50,7 +50,8 @@ struct MlpForward {
 };
 TESSERA_OPERATION(MlpForward);
 
-// Adds to `weightGradients`; overwrites `inputGradients`.
+// Adds to `weightGradients`; overwrites `inputGradients`. At least one of them is given: without weight gradients, a
+// network that other samples train can be passed through.
 struct MlpBackward {
   const MlpShape& shape;
   Count samples;
@@ -61,7 +62,7 @@ struct MlpBackward {
   Matrix<const float> outputGradients;      // [capacity][outputs], row-major; with respect to the activated output
   Slice<const float> firstOutputGradients;  // optional, [capacity]: added to the gradient of output 0 (a density that
                                             // compositing and a colour network both use)
-  Slice<float> weightGradients;             // [shape.parameters()]
+  Slice<float> weightGradients;             // optional, [shape.parameters()]
   Matrix<float> inputGradients;             // optional, [capacity][inputs]
 };
 TESSERA_OPERATION(MlpBackward);

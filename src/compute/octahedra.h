@@ -1,4 +1,4 @@
-// Grids of movable octahedra (Xu et al. 2023, UE4-NeRF, section 3.2): the triangles of `mesh`, the hits of rays on
+// Grids of movable octahedra (Gu et al. 2023, UE4-NeRF, section 3.1.2): the triangles of `mesh`, the hits of rays on
 // them, and the gradient of hits with respect to the vertices.
 //
 // A grid has N³ cells with one vertex each, which moves within its cell. Grid coordinates are in units of cells: cell
@@ -114,5 +114,23 @@ struct OctahedraBackward {
   Slice<float> displacementGradients;    // [cells][3]
 };
 TESSERA_OPERATION(OctahedraBackward);
+
+// Makes the grid of the next coarser level of detail (section 3.1.2), whose cells are twice as wide: each takes the
+// vertex of the most opaque of its eight children, the first of equal ones. The opacity of a child is the mean over
+// points in it, each 1 / (1 + exp(-x - offset)); that of cells that are not listed is 0. A cell whose children are all
+// less opaque than kTransparent gets the displacement 0.
+struct MergeOctahedra {
+  static constexpr float kTransparent = 1e-3f;
+
+  uint32_t resolution = 0;  // N of the finer grid, even
+  uint32_t points = 1;      // per cell
+  float offset = 0;
+  Slice<const uint32_t> cells;  // [cells listed], of the finer grid, distinct
+  Matrix<const float> x;        // [points · cells listed], 1 column: logits; row p · cells listed + i is of cells[i]
+  Slice<const float> displacements;  // [N³][3]
+  Slice<float> opacities;            // [N³], overwritten
+  Slice<float> mergedDisplacements;  // [(N/2)³][3], overwritten
+};
+TESSERA_OPERATION(MergeOctahedra);
 
 }  // namespace tessera

@@ -45,6 +45,7 @@ namespace tessera {
   X(OccupancySamples)           \
   X(TraceOctahedra)             \
   X(OctahedraBackward)          \
+  X(MergeOctahedra)             \
   X(DistinctTexels)             \
   X(VirtualGridForward)         \
   X(VirtualGridBackward)        \

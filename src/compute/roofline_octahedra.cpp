@@ -68,6 +68,24 @@ void measureOctahedra(RooflineRecorder& recorder) {
   backward.displacementGradients = sums;
   recorder.measureStream(kOperation<OctahedraBackward>, fmt::format("{:.0f} hits", hits),
                          hits * (20 + 12 + 72) + rays * 24.0, [&] { device.run(backward); });
+
+  constexpr uint32_t kPoints = 4;
+  std::vector<uint32_t> listed(grid.cells());
+  for (uint32_t cell = 0; cell < grid.cells(); ++cell) listed[cell] = cell;
+  const Array<uint32_t> cells = device.uploadArray(listed);
+  const Array<float> logits = recorder.randomFloats(size_t{kPoints} * grid.cells(), -4, 4);
+  Array<float> opacities = device.array<float>(grid.cells()),
+               merged = device.array<float>(size_t{3} * grid.cells() / 8);
+  MergeOctahedra merge;
+  merge.resolution = grid.resolution;
+  merge.points = kPoints;
+  merge.cells = cells;
+  merge.x = Matrix<const float>(logits.all(), 1);
+  merge.displacements = displacements;
+  merge.opacities = opacities;
+  merge.mergedDisplacements = merged;
+  recorder.measureStream(kOperation<MergeOctahedra>, fmt::format("{} cells, {} points each", grid.cells(), kPoints),
+                         vertices * (4 + 4 * kPoints + 4 + 12 + 1.5), [&] { device.run(merge); });
 }
 
 }  // namespace tessera

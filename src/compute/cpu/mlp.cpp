@@ -200,14 +200,14 @@ void backwardBlock(const MlpBackward& a, size_t n, size_t first, float* weightGr
     // The padding columns of the last layer are zero, and most of them are skipped.
     const int real = l == shape.hiddenLayers ? (shape.outputs + 3) / 4 * 4 : outputs;
     float* dh = buffers.gradient[l % 2];
-    outer(upstream, real, h, width, width, weightGradients + shape.weightOffset(l));
+    if (weightGradients) outer(upstream, real, h, width, width, weightGradients + shape.weightOffset(l));
     product<Finish::maskByActivation>(upstream, weights + shape.weightOffset(l), real, width, dh, width, h, width);
     dy = dh;
   }
   // The gradients of the first layer are [inputs][outputs], unlike those of the others, so that the input may have any
   // layout.
   const int outputs = shape.layerOutputs(0), inputs = shape.layerInputs(0);
-  outer(input, inputs, dy, outputs, outputs, weightGradients);
+  if (weightGradients) outer(input, inputs, dy, outputs, outputs, weightGradients);
   if (!a.inputGradients) return;
   float* dx = buffers.gradient[0];
   product<Finish::none>(rowMajor(dy, outputs), weights, outputs, inputs, dx, inputs);
@@ -291,8 +291,14 @@ void run(Context& context, const MlpBackward& a) {
   const size_t blocks = (rows.count() + kRows - 1) / kRows, parameters = a.shape.parameters();
   if (rows.count() == 0) return;
   const size_t parts = std::min<size_t>(kParts, blocks);
-  float* partial = partialGradients(parts * parameters);
   const auto block = HWY_DYNAMIC_DISPATCH(backwardBlock);
+  if (!a.weightGradients) {
+    context.pool.forRanges(blocks, 2, [&](size_t begin, size_t end) {
+      for (size_t b = begin; b < end; ++b) block(a, rows.end, rows.begin + b * kRows, nullptr, threadBuffers());
+    });
+    return;
+  }
+  float* partial = partialGradients(parts * parameters);
   context.pool.run(parts, [&](size_t task, int) {
     const size_t part = parts - 1 - task;  // the last samples of the forward pass may still be in the cache
     float* gradients = partial + part * parameters;

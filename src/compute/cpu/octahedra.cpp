@@ -442,5 +442,39 @@ void run(Context& context, const OctahedraBackward& a) {
   }
 }
 
+void run(Context& context, const MergeOctahedra& a) {
+  const uint32_t n = a.resolution, coarse = n / 2;
+  CHECK(n % 2 == 0u);
+  const size_t listed = a.cells.count;
+  const uint32_t* const cells = hostPointer(a.cells);
+  const float* const x = hostPointer(a.x.data);
+  float* const opacities = hostPointer(a.opacities);
+  std::fill_n(opacities, size_t{n} * n * n, 0.0f);
+  context.pool.forRanges(listed, 1024, [&](size_t begin, size_t end) {
+    for (size_t i = begin; i < end; ++i) {
+      float sum = 0;
+      for (size_t p = 0; p < a.points; ++p) sum += 1 / (1 + std::exp(-x[a.x.offset(p * listed + i, 0)] - a.offset));
+      opacities[cells[i]] = sum / static_cast<float>(a.points);
+    }
+  });
+  const float* const displacements = hostPointer(a.displacements);
+  float* const merged = hostPointer(a.mergedDisplacements);
+  context.pool.forRanges(size_t{coarse} * coarse * coarse, 1024, [&](size_t begin, size_t end) {
+    for (size_t cell = begin; cell < end; ++cell) {
+      const size_t place[3] = {cell % coarse, cell / coarse % coarse, cell / (size_t{coarse} * coarse)};
+      float largest = MergeOctahedra::kTransparent;
+      std::fill_n(merged + 3 * cell, 3, 0.0f);
+      for (size_t child = 0; child < 8; ++child) {
+        const size_t side[3] = {child & 1, child >> 1 & 1, child >> 2};
+        const size_t fine = 2 * place[0] + side[0] + n * (2 * place[1] + side[1] + n * (2 * place[2] + side[2]));
+        if (!(opacities[fine] > largest)) continue;
+        largest = opacities[fine];
+        for (int axis = 0; axis < 3; ++axis)
+          merged[3 * cell + axis] = 0.5f * (static_cast<float>(side[axis]) - 0.5f + displacements[3 * fine + axis]);
+      }
+    }
+  });
+}
+
 }  // namespace tessera::cpu
 #endif

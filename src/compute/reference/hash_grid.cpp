@@ -87,7 +87,7 @@ void run(const HashGridBackward& a) {
   const Doubles table = a.positionGradients ? doubles(a.table, a.grid.parameters()) : Doubles();
   const HashGridGradients gradients = hashGridBackward(a.grid, doublesOfRows(a.positions, 3, rows), table,
                                                        doubles(a.encodedGradients.rowsFrom(rows.begin), rows.count()));
-  add(a.tableGradients, gradients.table);
+  if (a.tableGradients) add(a.tableGradients, gradients.table);
   storeRows(a.positionGradients, 3, rows, gradients.positions);
 }
 

@@ -104,7 +104,7 @@ void run(const MlpBackward& a) {
   const MlpGradients gradients =
       mlpBackward(a.shape, samples, doubles(a.input.rowsFrom(rows.begin), samples),
                   doubles(a.weights, a.shape.parameters()), output, activations, outputGradients);
-  add(a.weightGradients, gradients.weights);
+  if (a.weightGradients) add(a.weightGradients, gradients.weights);
   if (a.inputGradients) store(a.inputGradients.rowsFrom(rows.begin), gradients.input);
 }
 

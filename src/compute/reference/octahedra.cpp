@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "compute/composite.h"
 #include "compute/reference/convert.h"
 #include "compute/reference/functions.h"
 
@@ -223,6 +224,38 @@ void run(const OctahedraBackward& a) {
       for (int axis = 0; axis < 3; ++axis) sums[size_t{3} * (*vertices)[corner] + axis] += gradients[3 * corner + axis];
   }
   add(a.displacementGradients, sums);
+}
+
+void run(const MergeOctahedra& a) {
+  const uint32_t n = a.resolution, coarse = n / 2;
+  CHECK(n % 2 == 0u);
+  const size_t listed = a.cells.count;
+  const Indices cells = indices(a.cells, listed);
+  const Doubles x = doubles(a.x, a.points * listed);
+  Doubles opacities(size_t{n} * n * n);
+  for (size_t i = 0; i < listed; ++i)
+    for (size_t p = 0; p < a.points; ++p)
+      opacities[cells[i]] += computeOpacity(Extinction::logit, x[p * listed + i] + a.offset, 0) / a.points;
+  store(a.opacities, opacities);
+  const Doubles displacements = doubles(a.displacements, 3 * opacities.size());
+  Doubles merged;
+  for (uint32_t cell = 0; cell < coarse * coarse * coarse; ++cell) {
+    const uint32_t place[3] = {cell % coarse, cell / coarse % coarse, cell / (coarse * coarse)};
+    double largest = MergeOctahedra::kTransparent;
+    Point displacement{};
+    for (uint32_t child = 0; child < 8; ++child) {
+      const uint32_t side[3] = {child & 1, child >> 1 & 1, child >> 2};
+      const uint32_t fine = 2 * place[0] + side[0] + n * (2 * place[1] + side[1] + n * (2 * place[2] + side[2]));
+      // Opacities are compared as stored, so that all devices choose the same child of equal ones.
+      const double opacity = static_cast<float>(opacities[fine]);
+      if (!(opacity > largest)) continue;
+      largest = opacity;
+      for (int axis = 0; axis < 3; ++axis)
+        displacement[axis] = (side[axis] - 0.5 + displacements[3 * size_t{fine} + axis]) / 2;
+    }
+    merged.insert(merged.end(), displacement.begin(), displacement.end());
+  }
+  store(a.mergedDisplacements, merged);
 }
 
 }  // namespace tessera::reference

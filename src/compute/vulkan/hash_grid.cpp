@@ -54,8 +54,10 @@ void VulkanDevice::enqueue(const HashGridBackward& options) {
   setLevels(grid, arguments.levels);
 
   const std::vector<uint32_t> constants = {static_cast<uint32_t>(grid.features)};
-  queue(sumKernel(kHashGridBackwardFloatAtomicsSpirv, kHashGridBackwardSpirv, constants), arguments,
-        countGroups(options.samples, kHashGridSamplesPerGroup, 1, arguments.levelCount));
+  if (options.tableGradients) {
+    queue(sumKernel(kHashGridBackwardFloatAtomicsSpirv, kHashGridBackwardSpirv, constants), arguments,
+          countGroups(options.samples, kHashGridSamplesPerGroup, 1, arguments.levelCount));
+  }
   if (options.positionGradients) {
     queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments,
           countGroups(options.samples, kHashGridSamplesPerGroup));

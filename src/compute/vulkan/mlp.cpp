@@ -177,7 +177,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
   const size_t capacity = options.samples.capacity;
   CHECK(options.input.columns == static_cast<uint32_t>(shape.inputs));
   CHECK(options.weights.count == shape.parameters());
-  CHECK(options.weightGradients.count == shape.parameters());
+  CHECK((!options.weightGradients || options.weightGradients.count == shape.parameters()));
   CHECK(capacity * shape.activationsPerSample() < size_t{1} << 31);
   if (capacity == 0) return;
 
@@ -216,7 +216,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
   const BlockKernel block = blockKernel(kBackwardForms, shape, std::max(width, paddedOutputs));
   queue(block.kernel, arguments, countGroups(options.samples, block.samples));
 
-  for (uint32_t layer = 0; layer <= hiddenLayers; ++layer) {
+  for (uint32_t layer = 0; options.weightGradients && layer <= hiddenLayers; ++layer) {
     arguments::MlpWeightGradientsArguments sums = {};
     sums.samples = arguments.last.samples;
     if (layer == 0) sums.inputs = matrixArguments(options.input, capacity);

@@ -3,7 +3,9 @@
 #include <algorithm>
 
 #include "compute/vulkan/vulkan_device.h"
+#include "shaders/cell_opacities.h"
 #include "shaders/compute/arguments_octahedra.h"
+#include "shaders/merge_octahedra.h"
 #include "shaders/octahedra_backward.h"
 #include "shaders/octahedra_backward_float_atomics.h"
 #include "shaders/trace_octahedra.h"
@@ -80,6 +82,25 @@ void VulkanDevice::enqueue(const OctahedraBackward& options) {
   std::copy(options.grid.gridFromScene.begin(), options.grid.gridFromScene.end(), arguments.gridFromScene);
   queue(sumKernel(kOctahedraBackwardFloatAtomicsSpirv, kOctahedraBackwardSpirv), arguments,
         countGroups(options.samples, kOctahedraRowsPerGroup));
+}
+
+template <>
+void VulkanDevice::enqueue(const MergeOctahedra& options) {
+  const uint32_t coarse = options.resolution / 2;
+  CHECK(options.resolution % 2 == 0u);
+  arguments::MergeOctahedraArguments arguments = {};
+  arguments.resolution = options.resolution;
+  arguments.points = options.points;
+  arguments.listed = static_cast<uint32_t>(options.cells.count);
+  arguments.offset = options.offset;
+  arguments.cells = deviceAddress(options.cells);
+  arguments.x = matrixArguments(options.x, size_t{options.points} * options.cells.count);
+  arguments.displacements = deviceAddress(options.displacements);
+  arguments.opacities = deviceAddress(options.opacities);
+  arguments.merged = deviceAddress(options.mergedDisplacements);
+  fillZero(options.opacities);
+  queue(kernel(kCellOpacitiesSpirv), arguments, {groups(options.cells.count, kOctahedraRowsPerGroup)});
+  queue(kernel(kMergeOctahedraSpirv), arguments, {groups(size_t{coarse} * coarse * coarse, kOctahedraRowsPerGroup)});
 }
 
 }  // namespace tessera

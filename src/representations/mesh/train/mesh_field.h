@@ -1,5 +1,5 @@
-// The field of UE4-NeRF (Xu et al. 2023, section 3.3): a hash grid and an encoder give 8 features of a point, the first
-// of which is the logit of its opacity; a decoder gives the colour of the features seen from a direction.
+// The field of UE4-NeRF (Gu et al. 2023, section 3.1.2): a hash grid and an encoder give 8 features of a point, the
+// first of which is the logit of its opacity; a decoder gives the colour of the features seen from a direction.
 #pragma once
 
 #include "compute/hash_grid.h"

@@ -1,4 +1,4 @@
-// The schedules of UE4-NeRF's losses (Xu et al. 2023, equations 5 and 7), scaled from the paper's 80,000 steps.
+// The schedules of UE4-NeRF's losses (Gu et al. 2023, equations 5 and 7), scaled from the paper's 80,000 steps.
 #pragma once
 
 #include <algorithm>
