@@ -17,6 +17,7 @@ struct TraceOctahedraArguments {
   FloatPointer farOfRay;  // optional
   FloatPointer displacements;
   UintPointer occupancy;
+  UintPointer keptFaces;  // optional
   UintPointer counts;   // [rays]: numbers of hits, then their prefix sums
   UintPointer fitting;  // [1]
   UintPointer firstSample;
@@ -32,7 +33,7 @@ struct TraceOctahedraArguments {
   // number.
   uint faces[2 * 112];
 };
-TESSERA_SIZE(TraceOctahedraArguments, 1120);
+TESSERA_SIZE(TraceOctahedraArguments, 1128);
 
 struct OctahedraBackwardArguments {
   CountArguments samples;

@@ -97,6 +97,7 @@ bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
     const real t = (t_ * ray.start[3] - ray.start[ray.z]) / (ray.slope[ray.z] - t_ * ray.slope[3]);
     if (!(t > ray.near && t < ray.far)) continue;
     const uint face = (octahedron.x + n * (octahedron.y + n * octahedron.z)) * kFacesPerCell + local;
+    if (IS_SET(PARAMETERS.keptFaces) && (PARAMETERS.keptFaces.values[face / 32] >> face % 32 & 1) == 0) continue;
     uint place = min(hitCount, kMaxHitsInCell - 1);
     if (hitCount == kMaxHitsInCell && s >= hits[place].s) continue;
     for (; place > 0 && (s < hits[place - 1].s || (s == hits[place - 1].s && face < hits[place - 1].face)); --place) {

@@ -139,6 +139,11 @@ void runTrace(Stage& stage, const OctahedraGrid& grid, const Size& size, const O
   if (options.everything) a.farOfRay = stage.input(rays.far);
   a.displacements = stage.input(displacements);
   a.occupancy = stage.input(randomOccupancy(stage.random, grid, options.occupied));
+  if (options.everything) {
+    std::vector<uint32_t> bits(grid.faceWords());
+    for (uint32_t& word : bits) word = stage.random.bits() | stage.random.bits();
+    a.keptFaces = stage.input(bits);
+  }
   a.firstSample = stage.outputWords("firstSample", size.capacity + 1);
   a.sampleCount = stage.outputWords("sampleCount", 1);
   if (options.everything) {

@@ -31,6 +31,8 @@ struct OctahedraGrid {
   uint32_t cells() const { return resolution * resolution * resolution; }
   // Bits of cells are those of MarchRays::occupancy: cell (i, j, k) at i + N (j + N k).
   uint32_t words() const { return (cells() + 31) / 32; }
+  // Words of the bits of faces, least significant first.
+  uint32_t faceWords() const { return (20 * cells() + 31) / 32; }
 };
 
 // Faces are numbered 20 · cell + local. Local numbers 0 to 7 are the outer faces: bit a is set if the corner along axis
@@ -82,6 +84,7 @@ struct TraceOctahedra {
   Slice<const float> farOfRay;       // optional, [rays]
   Slice<const float> displacements;  // [cells][3]
   Slice<const uint32_t> occupancy;   // bits, [grid.words()]
+  Slice<const uint32_t> keptFaces;   // optional, bits, [grid.faceWords()]: only these faces are hit
   Slice<uint32_t> firstSample;       // [rays + 1]: hits of ray r are [firstSample[r], firstSample[r+1])
   Slice<uint32_t> sampleCount;       // [1]: total number of hits
   Slice<uint32_t> finishedRays;      // optional, [1]: number of rays that fit

@@ -155,6 +155,7 @@ class Walk {
         first_(hits.size()),
         line_(a.grid, hostPointer(a.origins) + 3 * size_t{ray}, hostPointer(a.directions) + 3 * size_t{ray}),
         displacements_(hostPointer(a.displacements)),
+        keptFaces_(hostPointer(a.keptFaces)),
         n_(static_cast<int>(a.grid.resolution)) {
     for (auto& numbers : sheared_) std::fill(numbers, numbers + kSlots, std::numeric_limits<float>::quiet_NaN());
   }
@@ -288,8 +289,9 @@ class Walk {
         if (!(s >= enter && s < leave)) continue;
         const int8_t* const offset = faces.cell[face];
         const uint32_t octahedron = index + static_cast<uint32_t>(offset[0] + n_ * (offset[1] + n_ * offset[2]));
-        const Near one{
-            s, octahedron * kFacesPerCell + faces.local[face], {edges[1][lane] / total, edges[2][lane] / total}};
+        const uint32_t number = octahedron * kFacesPerCell + faces.local[face];
+        if (keptFaces_ && (keptFaces_[number / 32] >> number % 32 & 1) == 0) continue;
+        const Near one{s, number, {edges[1][lane] / total, edges[2][lane] / total}};
         if (hitCount == kMaxHitsInCell && !(one < near[hitCount - 1])) continue;
         size_t place = hitCount < kMaxHitsInCell ? hitCount++ : hitCount - 1;
         for (; place > 0 && one < near[place - 1]; --place) near[place] = near[place - 1];
@@ -316,6 +318,7 @@ class Walk {
   size_t first_;  // of the ray in hits_
   HomogeneousRay line_;
   const float* displacements_;
+  const uint32_t* keptFaces_;      // null: all are
   int n_, x_ = 0, y_ = 1, z_ = 2;  // z_: the axis along which the ray is longest
   double near_ = 0, far_ = 0, entry_[3] = {}, step_[3] = {};
   alignas(64) float sheared_[3][kSlots];

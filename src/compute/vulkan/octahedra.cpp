@@ -32,6 +32,7 @@ void VulkanDevice::enqueue(const TraceOctahedra& options) {
   arguments.farOfRay = deviceAddress(options.farOfRay);
   arguments.displacements = deviceAddress(options.displacements);
   arguments.occupancy = deviceAddress(options.occupancy);
+  arguments.keptFaces = deviceAddress(options.keptFaces);
   arguments.counts = scratch.counts;
   arguments.fitting = scratch.fitting;
   arguments.firstSample = deviceAddress(options.firstSample);

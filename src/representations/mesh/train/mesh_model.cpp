@@ -40,6 +40,7 @@ void MeshModel::trace(const Rays& rays, uint32_t maximum, MeshHits& hits) {
   trace.farOfRay = rays.far;
   trace.displacements = displacements_.values;
   trace.occupancy = tracedCells_;
+  if (keptFaces_.size() > 0) trace.keptFaces = keptFaces_;
   trace.firstSample = hits.firstSample;
   trace.sampleCount = hits.counters.part(0, 1);
   trace.finishedRays = hits.counters.part(1, 1);
@@ -49,6 +50,11 @@ void MeshModel::trace(const Rays& rays, uint32_t maximum, MeshHits& hits) {
   trace.positions = hits.positions;
   trace.distances = hits.distances;
   device_.run(trace);
+}
+
+void MeshModel::keepFaces(const std::vector<uint32_t>& bits) {
+  CHECK((bits.empty() || bits.size() == grid_.faceWords()));
+  keptFaces_ = device_.uploadArray(bits);
 }
 
 void MeshModel::backward(const Rays& rays, const MeshHits& hits, Slice<const float> positionGradients) {

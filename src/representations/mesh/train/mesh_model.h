@@ -34,6 +34,8 @@ class MeshModel {
   };
   // Finds the hits of rays in occupied cells and their neighbours; each ray keeps its nearest `maximum`.
   void trace(const Rays& rays, uint32_t maximum, MeshHits& hits);
+  // From now on, rays hit only these faces (bits, TraceOctahedra::keptFaces); all faces if empty.
+  void keepFaces(const std::vector<uint32_t>& bits);
   // Adds to the gradients of the vertices.
   void backward(const Rays& rays, const MeshHits& hits, Slice<const float> positionGradients);
 
@@ -69,6 +71,7 @@ class MeshModel {
   ParameterGroup displacements_;
   OccupancyGrid occupancy_;
   Array<uint32_t> tracedCells_;  // occupied cells and their neighbours, as OccupancyGrid::bits
+  Array<uint32_t> keptFaces_;    // without elements: all faces are
 };
 
 // Returns the cells of a grid, bits of [cells³], that are set or have a neighbour that is, diagonal ones included.

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "representations/field/testing/trained_cube.h"
+#include "representations/mesh/train/extraction.h"
 #include "representations/mesh/train/mesh_renderer.h"
 
 namespace tessera {
@@ -71,6 +72,36 @@ TEST(MeshTrainer, LearnsWhatHeldOutPhotosSee) {
   const CubeScene scene;
   TrainedMesh trained(scene, smallMeshConfig(), 400);
   EXPECT_GT(heldOutPsnr(scene, trained.trainer->model()), 17);
+}
+
+TEST(Extraction, KeepsTheFacesThatPhotosSee) {
+  const CubeScene scene;
+  TrainedMesh trained(scene, smallMeshConfig(), 400);
+  MeshModel& model = trained.trainer->model();
+  const double before = heldOutPsnr(scene, model);
+  ExtractionSettings few;
+  few.photoStride = 4;
+  few.raysPerCell = 0;
+  ExtractionSettings photos = few;
+  photos.photoStride = 1;
+  ExtractionSettings all = photos;
+  all.raysPerCell = 2;
+  const FaceSet some = extractFaces(model, scene.capture(), few), most = extractFaces(model, scene.capture(), photos),
+                faces = extractFaces(model, scene.capture(), all);
+  EXPECT_GT(some.count(), 50u);
+  EXPECT_LT(some.count(), most.count());
+  EXPECT_LT(most.count(), faces.count());
+  EXPECT_LT(faces.count(), 20 * model.grid().cells() / 10);
+  for (uint32_t face = 0; face < 20 * model.grid().cells(); ++face) {
+    EXPECT_LE(some.contains(face), most.contains(face)) << "rays were added";
+    EXPECT_LE(most.contains(face), faces.contains(face)) << "rays were added";
+  }
+  model.keepFaces(faces.bits());
+  EXPECT_GT(heldOutPsnr(scene, model), before - 1.5);
+  model.keepFaces(FaceSet(model.grid()).bits());
+  EXPECT_LT(heldOutPsnr(scene, model), before - 3) << "without faces nothing is left";
+  model.keepFaces({});
+  EXPECT_EQ(heldOutPsnr(scene, model), before);
 }
 
 TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {

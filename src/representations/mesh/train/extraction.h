@@ -1,0 +1,61 @@
+// Extraction of triangles (Gu et al. 2023, section 3.2): of all faces of the octahedra, only those are kept that rays
+// see: of the training photos, and parallel rays from above.
+#pragma once
+
+#include <functional>
+
+#include "representations/mesh/train/mesh_model.h"
+#include "scene/capture.h"
+
+namespace tessera {
+
+struct ExtractionSettings {
+  float minOpacity = 0.3f;  // of a hit that keeps its face
+  float maxOpacity = 0.8f;  // accumulated opacity beyond which a ray sees no further face
+  int photoStride = 1;      // every photoStride-th pixel of a photo, along both axes
+  // Parallel rays: straight down, and from kAzimuths directions at each of the elevations; none with 0.
+  double raysPerCell = 4;  // along an edge of a cell
+};
+
+// Bits of faces, as TraceOctahedra::keptFaces.
+class FaceSet {
+ public:
+  FaceSet() = default;
+  explicit FaceSet(const OctahedraGrid& grid) : bits_(grid.faceWords()) {}
+
+  void add(uint32_t face) { bits_[face / 32] |= 1u << face % 32; }
+  bool contains(uint32_t face) const { return (bits_[face / 32] >> face % 32 & 1) != 0; }
+  bool empty() const { return bits_.empty(); }
+  size_t count() const;
+  const std::vector<uint32_t>& bits() const { return bits_; }
+
+ private:
+  std::vector<uint32_t> bits_;
+};
+
+// Marks the faces that rays see.
+class FaceMarker {
+ public:
+  // Keeps a reference to `model`.
+  FaceMarker(MeshModel& model, const ExtractionSettings& settings);
+
+  static constexpr uint32_t kMaxRays = 4096;
+  // Follows the first rays of at most kMaxRays, as many as fit the buffers; returns their number, at least 1.
+  uint32_t mark(const MeshModel::Rays& rays);
+  const FaceSet& faces() const { return faces_; }
+
+ private:
+  MeshModel& model_;
+  ExtractionSettings settings_;
+  FaceSet faces_;
+  MeshHits hits_;
+  Array<uint32_t> counters_;
+  Array<float> logits_;
+};
+
+// Returns the faces that the training photos of `capture` and parallel rays see. Throws Error if a mask cannot be read.
+FaceSet extractFaces(
+    MeshModel& model, const Capture& capture, const ExtractionSettings& settings,
+    const std::function<void(int64_t done, int64_t all)>& onPhoto = [](int64_t, int64_t) {});
+
+}  // namespace tessera
