@@ -38,9 +38,12 @@ void PhotoLoss::compare(const PhotoRays& rays, const Picture& picture, Slice<flo
 void PhotoLoss::passBack(const PhotoRays& rays, const Picture& picture) {
   const Slice<float> gradients = colourGradients(picture);
   if (!picture.standsBeforeBackgrounds) device_.fillZero(opacityGradients(picture));
+  if (!picture.trainsExposures && unusedGradients_.size() == 0)
+    unusedGradients_ = device_.array<float>(exposures_.gradients().count);
   device_.run(ExposureBackward{picture.finished, picture.colour, backgrounds(rays, picture),
                                rays.photoOfRay(picture.first, picture.count), exposures_.logGains(), gradients,
-                               gradients, opacityGradients(picture), exposures_.gradients()});
+                               gradients, opacityGradients(picture),
+                               picture.trainsExposures ? exposures_.gradients() : unusedGradients_.all()});
 }
 
 }  // namespace tessera

@@ -25,6 +25,7 @@ class PhotoLoss {
     Slice<const float> colour, opacity;   // [count][3], [count]
     bool standsBeforeBackgrounds = true;  // composite over PhotoRays::backgrounds; else colours include a background
     float weight = 1;                     // of the colour loss
+    bool trainsExposures = true;
   };
   static constexpr uint32_t kLosses = 2;  // the colour loss, and the sum of squared errors
 
@@ -53,6 +54,7 @@ class PhotoLoss {
   float parameter_;
   PhotoExposures exposures_;
   Array<float> exposed_, colourGradients_, opacityGradients_;
+  Array<float> unusedGradients_;  // of the exposures, from images that do not train them
 };
 
 }  // namespace tessera

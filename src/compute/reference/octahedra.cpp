@@ -178,8 +178,8 @@ void run(const TraceOctahedra& a) {
                        {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]}, a.near,
                        farOfRay.empty() ? 1e30 : farOfRay[r]);
     if (a.keptFaces) {
-      const Indices kept = indices(a.keptFaces, a.grid.faceWords());
-      std::erase_if(hits, [&](const FaceHit& hit) { return (kept[hit.face / 32] >> hit.face % 32 & 1) == 0; });
+      const Indices faceBits = indices(a.keptFaces, a.grid.faceWords());
+      std::erase_if(hits, [&](const FaceHit& hit) { return (faceBits[hit.face / 32] >> hit.face % 32 & 1) == 0; });
     }
     if (hits.size() > a.maximum) hits.resize(a.maximum);
     full = full || sampleCount + hits.size() > a.sampleCapacity;

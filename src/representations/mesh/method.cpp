@@ -21,7 +21,7 @@ std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& set
   const MeshConfig& config = SettingsOf<MeshConfig>::in(settings);
   const MeshFieldShape shape = config.shape();
   return {{"parameters", shape.grid.parameters() + shape.encoder.parameters() + shape.decoder.parameters()},
-          {"vertices", config.grid().cells()},
+          {"vertices", config.grid(0).cells()},
           {"multiply_accumulates_per_sample", 8 * shape.grid.columns() + countMultiplyAccumulates(shape.encoder)},
           {"view_dependent_multiply_accumulates_per_sample", countMultiplyAccumulates(shape.decoder)}};
 }

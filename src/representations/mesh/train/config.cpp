@@ -1,7 +1,6 @@
 #include "representations/mesh/train/config.h"
 
 #include <algorithm>
-#include <cmath>
 
 namespace tessera {
 
@@ -21,6 +20,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       widthSetting(),
       hiddenSetting(),
       meshCellsSetting(),
+      meshLevelsSetting().within(1, maxLevels()),
       everyCellSetting(),
       opacityOffsetSetting(),
       seedSetting(),
@@ -49,6 +49,12 @@ std::vector<ConfigField> MeshConfig::fields() {
   };
 }
 
+int MeshConfig::maxLevels() const {
+  int levels = 1;  // the cells of the coarsest level along an edge must be a multiple of 4
+  while (levels < 5 && (meshCells >> levels) % 4 == 0 && (meshCells >> levels) << levels == meshCells) ++levels;
+  return levels;
+}
+
 void MeshConfig::check() const {
   MeshConfig checked = *this;
   requireWithinBounds(checked.fields());
@@ -65,21 +71,12 @@ MeshFieldShape MeshConfig::shape() const {
   return makeMeshFieldShape(options, width, hidden);
 }
 
-OctahedraGrid MeshConfig::grid() const {
-  OctahedraGrid grid{static_cast<uint32_t>(meshCells),
+OctahedraGrid MeshConfig::grid(uint32_t level) const {
+  OctahedraGrid grid{static_cast<uint32_t>(meshCells) >> level,
                      everyCell ? OctahedraPlacement::all : OctahedraPlacement::checkerboard};
-  const float half = 0.5f * static_cast<float>(meshCells);
+  const float half = 0.5f * static_cast<float>(grid.resolution);
   grid.gridFromScene = {half, 0, 0, half, 0, half, 0, half, 0, 0, half, half, 0, 0, 0, 1};
   return grid;
-}
-
-MarchSpace MeshConfig::space() const {
-  MarchSpace space;
-  space.contracted = false;
-  space.gridResolution = meshCells;
-  space.minStep = std::exp(static_cast<float>(opacityOffset));
-  space.cone = 0;
-  return space;
 }
 
 }  // namespace tessera

@@ -31,6 +31,8 @@ struct MeshConfig : RaySettings,
   SETTING(int, gridFeatures, 2, "grid_features", "features per hash entry", allowedValues({1, 2, 4, 8}));
   SETTING(int, meshCells, 64, "mesh_cells", "cells along an edge of the grid of octahedra",
           within(4, 256).withDivisor(4, 0));
+  SETTING(int, meshLevels, 5, "mesh_levels",
+          "levels of detail, each with cells twice as wide as those of the next finer one", within(1, 5).dependent());
   SETTING(bool, everyCell, false, "every_cell",
           "every cell carries an octahedron, as the paper's text says; else every second one, so that none overlap",
           anything());
@@ -48,16 +50,16 @@ struct MeshConfig : RaySettings,
   SETTING(bool, opaqueLoss, true, "opaque_loss", "the second loss, which makes surfaces opaque", anything());
 
   MeshConfig();
+  // The number of levels that this number of cells can be divided into, at most 5.
+  int maxLevels() const;
   // In the order of config.toml.
   std::vector<ConfigField> fields();
   // Throws Error that names the first invalid setting.
   void check() const;
 
   MeshFieldShape shape() const;
-  // The grid of octahedra that fills the region of interest, [-1,1]³.
-  OctahedraGrid grid() const;
-  // The space of the occupancy, in which exp of an opacity's logit is compared with a threshold.
-  MarchSpace space() const;
+  // The grid of octahedra of a level, which fills the region of interest, [-1,1]³.
+  OctahedraGrid grid(uint32_t level) const;
 };
 
 }  // namespace tessera

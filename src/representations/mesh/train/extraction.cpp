@@ -37,8 +37,7 @@ class PhotoFaces final : public PixelVisitor {
 };
 
 // Follows parallel rays through the region of interest, [-1,1]³, on a square lattice with the given spacing.
-void markParallel(MeshModel& model, FaceMarker& marker, const Vec3d& direction, double spacing) {
-  Device& device = model.device();
+void markParallel(Device& device, FaceMarker& marker, const Vec3d& direction, double spacing) {
   const Vec3d right = std::abs(direction.z()) > 0.9 ? Vec3d::UnitX() : direction.cross(Vec3d::UnitZ()).normalized();
   const Vec3d up = right.cross(direction);
   const double reach = std::sqrt(3.0);  // of the region, from its centre
@@ -76,10 +75,11 @@ size_t FaceSet::count() const {
   return faces;
 }
 
-FaceMarker::FaceMarker(MeshModel& model, const ExtractionSettings& settings)
+FaceMarker::FaceMarker(MeshModel& model, uint32_t level, const ExtractionSettings& settings)
     : model_(model),
+      level_(level),
       settings_(settings),
-      faces_(model.grid()),
+      faces_(model.level(level).grid()),
       hits_(model.device(), kMaxRays, kExtractionSamples),
       counters_(model.device().array<uint32_t>(MeshHits::kCounters)),
       logits_(model.device().array<float>(kExtractionSamples)) {
@@ -87,10 +87,10 @@ FaceMarker::FaceMarker(MeshModel& model, const ExtractionSettings& settings)
   model.field().reserve(kExtractionSamples);
 }
 
-uint32_t FaceMarker::mark(const MeshModel::Rays& rays) {
+uint32_t FaceMarker::mark(const MeshRays& rays) {
   constexpr uint32_t kMaxHits = 1024;  // of a ray
   Device& device = model_.device();
-  model_.trace(rays, kMaxHits, hits_);
+  model_.level(level_).trace(rays, kMaxHits, hits_);
   model_.field().encode(hits_.samples(), hits_.positions, Matrix<float>(logits_, 1));
   const std::vector<uint32_t> counters = device.read(counters_.all());
   const uint32_t followed = counters[1];
@@ -109,20 +109,20 @@ uint32_t FaceMarker::mark(const MeshModel::Rays& rays) {
   return followed;
 }
 
-FaceSet extractFaces(MeshModel& model, const Capture& capture, const ExtractionSettings& settings,
+FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, const ExtractionSettings& settings,
                      const std::function<void(int64_t, int64_t)>& onPhoto) {
-  FaceMarker marker(model, settings);
+  FaceMarker marker(model, level, settings);
   PhotoFaces photos(model, marker);
   PhotoVisitor(capture, model.frame(), FaceMarker::kMaxRays, photos).visitAll(settings.photoStride, {}, onPhoto);
   if (settings.raysPerCell > 0) {
-    const double spacing = 2.0 / model.grid().resolution / settings.raysPerCell;
-    markParallel(model, marker, -Vec3d::UnitZ(), spacing);
+    const double spacing = 2.0 / model.level(level).grid().resolution / settings.raysPerCell;
+    markParallel(model.device(), marker, -Vec3d::UnitZ(), spacing);
     for (const double degrees : kElevations) {
       const double elevation = degrees * std::numbers::pi / 180;
       for (uint32_t k = 0; k < kAzimuths; ++k) {
         const double azimuth = 2 * std::numbers::pi * k / kAzimuths;
         markParallel(
-            model, marker,
+            model.device(), marker,
             {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), -std::sin(elevation)},
             spacing);
       }

@@ -37,15 +37,16 @@ class FaceSet {
 class FaceMarker {
  public:
   // Keeps a reference to `model`.
-  FaceMarker(MeshModel& model, const ExtractionSettings& settings);
+  FaceMarker(MeshModel& model, uint32_t level, const ExtractionSettings& settings);
 
   static constexpr uint32_t kMaxRays = 4096;
   // Follows the first rays of at most kMaxRays, as many as fit the buffers; returns their number, at least 1.
-  uint32_t mark(const MeshModel::Rays& rays);
+  uint32_t mark(const MeshRays& rays);
   const FaceSet& faces() const { return faces_; }
 
  private:
   MeshModel& model_;
+  uint32_t level_;
   ExtractionSettings settings_;
   FaceSet faces_;
   MeshHits hits_;
@@ -53,9 +54,10 @@ class FaceMarker {
   Array<float> logits_;
 };
 
-// Returns the faces that the training photos of `capture` and parallel rays see. Throws Error if a mask cannot be read.
+// Returns the faces of a level that the training photos of `capture` and parallel rays see. Throws Error if a mask
+// cannot be read.
 FaceSet extractFaces(
-    MeshModel& model, const Capture& capture, const ExtractionSettings& settings,
+    MeshModel& model, uint32_t level, const Capture& capture, const ExtractionSettings& settings,
     const std::function<void(int64_t done, int64_t all)>& onPhoto = [](int64_t, int64_t) {});
 
 }  // namespace tessera

@@ -67,7 +67,10 @@ MeshField::Output MeshField::forward(Count samples, Slice<const float> positions
 }
 
 void MeshField::backward(Count samples, Slice<const float> positions, Slice<const float> logitGradients,
-                         Matrix<const float> colourGradients, Slice<float> positionGradients) {
+                         Matrix<const float> colourGradients, bool trains, Slice<float> positionGradients) {
+  const auto parameterGradients = [&](ParameterGroup& group) {
+    return trains ? group.gradients.all() : Slice<float>();
+  };
   const uint32_t inputs = static_cast<uint32_t>(shape_.decoder.inputs);
   const Matrix<float> input(decoderInput_, inputs), inputGradients(decoderInputGradients_, inputs);
   device_.run(MlpBackward{shape_.decoder,
@@ -78,14 +81,14 @@ void MeshField::backward(Count samples, Slice<const float> positions, Slice<cons
                           decoderActivations_,
                           colourGradients,
                           {},
-                          decoder_.gradients,
+                          parameterGradients(decoder_),
                           inputGradients});
   const Matrix<float> encodedGradients = byLevel(encodedGradients_);
   device_.run(MlpBackward{shape_.encoder, samples, byLevel(encoded_), encoder_.values, features(), encoderActivations_,
-                          inputGradients.columnRange(0, kFeatures), logitGradients, encoder_.gradients,
+                          inputGradients.columnRange(0, kFeatures), logitGradients, parameterGradients(encoder_),
                           encodedGradients});
-  device_.run(HashGridBackward{shape_.grid, samples, positions, table_.values, encodedGradients, table_.gradients,
-                               positionGradients});
+  device_.run(HashGridBackward{shape_.grid, samples, positions, table_.values, encodedGradients,
+                               parameterGradients(table_), positionGradients});
 }
 
 }  // namespace tessera

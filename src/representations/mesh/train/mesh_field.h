@@ -41,10 +41,10 @@ class MeshField {
   // The output is valid until the next call.
   Output forward(Count samples, Slice<const float> positions, Slice<const float> directions,
                  Slice<const uint32_t> rayOfSample, bool forBackward);
-  // Call it after `forward` with the same samples. Adds to the gradients of the parameter groups, and overwrites
-  // `positionGradients`, [capacity][3], if given.
+  // Call it after `forward` with the same samples. Adds to the gradients of the parameter groups, if it `trains` them,
+  // and overwrites `positionGradients`, [capacity][3], if given; one of both at least.
   void backward(Count samples, Slice<const float> positions, Slice<const float> logitGradients,
-                Matrix<const float> colourGradients, Slice<float> positionGradients);
+                Matrix<const float> colourGradients, bool trains, Slice<float> positionGradients);
 
   ParameterGroup& table() { return table_; }
   ParameterGroup& encoder() { return encoder_; }

@@ -71,7 +71,8 @@ TEST(MeshField, HasGradientsThatAgreeWithFiniteDifferences) {
   const Array<float> logits = scene.device->uploadArray(scene.logitFactors),
                      colours = scene.device->uploadArray(scene.colourFactors);
   Array<float> positionGradients = scene.device->array<float>(size_t{3} * kSamples);
-  scene.field.backward({kSamples}, scene.positions, logits, Matrix<const float>(colours.all(), 3), positionGradients);
+  scene.field.backward({kSamples}, scene.positions, logits, Matrix<const float>(colours.all(), 3), true,
+                       positionGradients);
   for (ParameterGroup* group : {&scene.field.table(), &scene.field.encoder(), &scene.field.decoder()})
     expectGradientsOfDifferences(*scene.device, *group, [&] { return scene.scalar(); });
   const std::vector<float> gradients = scene.device->read(positionGradients.all());

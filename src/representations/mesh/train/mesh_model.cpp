@@ -2,148 +2,126 @@
 
 #include <algorithm>
 
-#include "base/error.h"
-#include "compute/occupancy.h"
+#include "base/random.h"
 #include "train/run_folder.h"
 
 namespace tessera {
+namespace {
 
-MeshHits::MeshHits(Device& device, uint32_t rays, uint32_t samples)
-    : firstSample(device.array<uint32_t>(rays + size_t{1})),
-      rayOfSample(device.array<uint32_t>(samples)),
-      faces(device.array<uint32_t>(samples)),
-      barycentrics(device.array<float>(size_t{2} * samples)),
-      positions(device.array<float>(size_t{3} * samples)),
-      distances(device.array<float>(samples)) {}
+constexpr uint32_t kPointsPerCell = 16;  // at which the opacities of cells are compared
+constexpr uint32_t kPointsAtATime = 1 << 16;
+
+bool isSet(const std::vector<uint32_t>& bits, size_t i) {
+  return (bits[i / 32] >> i % 32 & 1) != 0;
+}
+
+}  // namespace
 
 MeshModel::MeshModel(Device& device, const MeshConfig& config, const SceneFrame& frame)
     : device_(device),
       config_(config),
       frame_(frame),
-      grid_(config.grid()),
-      field_(device, config.shape(), static_cast<uint64_t>(config.seed)),
-      displacements_(device, "displacements", std::vector<float>(size_t{3} * grid_.cells())),
-      occupancy_(device, config.space()),
-      tracedCells_(device.array<uint32_t>(grid_.words())) {
-  updateTracedCells();
+      field_(device, config.shape(), static_cast<uint64_t>(config.seed)) {
+  levels_.push_back(makeLevel(0, std::vector<float>(size_t{3} * config.grid(0).cells())));
 }
 
-void MeshModel::trace(const Rays& rays, uint32_t maximum, MeshHits& hits) {
-  CHECK(rays.count < hits.firstSample.size());
-  TraceOctahedra trace{grid_};
-  trace.rays = {rays.count};
-  trace.sampleCapacity = static_cast<uint32_t>(hits.distances.size());
-  trace.maximum = maximum;
-  trace.near = static_cast<float>(config_.near);
-  trace.origins = rays.origins;
-  trace.directions = rays.directions;
-  trace.farOfRay = rays.far;
-  trace.displacements = displacements_.values;
-  trace.occupancy = tracedCells_;
-  if (keptFaces_.size() > 0) trace.keptFaces = keptFaces_;
-  trace.firstSample = hits.firstSample;
-  trace.sampleCount = hits.counters.part(0, 1);
-  trace.finishedRays = hits.counters.part(1, 1);
-  trace.rayOfSample = hits.rayOfSample;
-  trace.faces = hits.faces;
-  trace.barycentrics = hits.barycentrics;
-  trace.positions = hits.positions;
-  trace.distances = hits.distances;
-  device_.run(trace);
+std::unique_ptr<MeshLevel> MeshModel::makeLevel(uint32_t number, const std::vector<float>& displacements) {
+  MeshLevel::Settings settings;
+  settings.near = static_cast<float>(config_.near);
+  settings.minCosine = static_cast<float>(config_.minCosine);
+  settings.opacityOffset = opacityOffset();
+  settings.occupancyDecay = static_cast<float>(config_.occupancyDecay);
+  return std::make_unique<MeshLevel>(device_, number, config_.grid(number), settings, displacements);
 }
 
-void MeshModel::keepFaces(const std::vector<uint32_t>& bits) {
-  CHECK((bits.empty() || bits.size() == grid_.faceWords()));
-  keptFaces_ = device_.uploadArray(bits);
+void MeshModel::addCoarseLevels(uint64_t seed) {
+  while (levels() < static_cast<uint32_t>(config_.meshLevels)) levels_.push_back(mergeLevel(levels(), seed));
 }
 
-void MeshModel::backward(const Rays& rays, const MeshHits& hits, Slice<const float> positionGradients) {
-  OctahedraBackward back{grid_};
-  back.samples = hits.samples();
-  back.minCosine = static_cast<float>(config_.minCosine);
-  back.origins = rays.origins;
-  back.directions = rays.directions;
-  back.displacements = displacements_.values;
-  back.rayOfSample = hits.rayOfSample;
-  back.faces = hits.faces;
-  back.barycentrics = hits.barycentrics;
-  back.distances = hits.distances;
-  back.positionGradients = positionGradients;
-  back.displacementGradients = displacements_.gradients;
-  device_.run(back);
-}
+std::unique_ptr<MeshLevel> MeshModel::mergeLevel(uint32_t number, uint64_t seed) {
+  MeshLevel& finer = level(number - 1);
+  const uint32_t n = finer.grid().resolution;
+  const std::vector<uint32_t> traced = finer.tracedCells();
+  std::vector<uint32_t> cells;
+  for (uint32_t cell = 0; cell < finer.grid().cells(); ++cell)
+    if (isSet(traced, cell)) cells.push_back(cell);
+  const uint32_t listed = static_cast<uint32_t>(cells.size());
 
-void MeshModel::exclude(const std::vector<bool>& possible) {
-  occupancy_.exclude(possible);
-  occupancy_.fill(1);
-  updateTracedCells();
-}
+  // Logits of random points in the cells.
+  const RandomStream random(seed, number);
+  Array<float> logits = device_.array<float>(size_t{kPointsPerCell} * std::max(1u, listed)),
+               positions = device_.array<float>(size_t{3} * kPointsAtATime);
+  field_.reserve(kPointsAtATime);
+  const uint64_t points = uint64_t{kPointsPerCell} * listed;
+  std::vector<float> chunk(size_t{3} * kPointsAtATime);
+  for (uint64_t first = 0; first < points; first += kPointsAtATime) {
+    const uint32_t count = static_cast<uint32_t>(std::min<uint64_t>(kPointsAtATime, points - first));
+    for (uint32_t i = 0; i < count; ++i) {
+      const uint64_t point = first + i;
+      const uint32_t cell = cells[point % listed], place[3] = {cell % n, cell / n % n, cell / (n * n)};
+      for (uint32_t axis = 0; axis < 3; ++axis)
+        chunk[3 * size_t{i} + axis] =
+            (static_cast<float>(place[axis]) + random.uniform(3 * point + axis)) / static_cast<float>(n);
+    }
+    device_.write(positions.all(), std::span<const float>(chunk));
+    field_.encode({count}, positions, Matrix<float>(logits.part(first, count), 1));
+  }
 
-void MeshModel::addOccupancy(const Rays& rays, const MeshHits& hits, Matrix<const float> logits) {
-  OccupancySamples samples;
-  samples.resolution = grid_.resolution;
-  samples.offset = opacityOffset();
-  samples.rays = hits.finished(rays.count);
-  samples.firstSample = hits.firstSample;
-  samples.x = logits;
-  samples.positions = hits.positions;
-  samples.grid = occupancy_.raisedBySamples();
-  device_.run(samples);
-}
+  const OctahedraGrid grid = config_.grid(number);
+  Array<float> opacities = device_.array<float>(finer.grid().cells()),
+               merged = device_.array<float>(size_t{3} * grid.cells());
+  const Array<uint32_t> listedCells = device_.uploadArray(cells);
+  MergeOctahedra merge;
+  merge.resolution = n;
+  merge.points = kPointsPerCell;
+  merge.offset = opacityOffset();
+  merge.cells = listedCells;
+  merge.x = Matrix<const float>(logits.all(), 1);
+  merge.displacements = finer.displacements().values;
+  merge.opacities = opacities;
+  merge.mergedDisplacements = merged;
+  device_.run(merge);
+  std::unique_ptr<MeshLevel> level = makeLevel(number, device_.read(merged.all()));
 
-void MeshModel::refreshOccupancy() {
-  constexpr float kThreshold = 0.05f;
-  occupancy_.update(static_cast<float>(config_.occupancyDecay), kThreshold);
-  updateTracedCells();
-}
-
-void MeshModel::updateTracedCells() {
-  device_.write(tracedCells_.all(), std::span<const uint32_t>(dilateCells(occupancy_.bitWords(), grid_.resolution)));
+  // A cell may hold a surface if one of its children does.
+  const std::vector<uint32_t> occupied = finer.occupancy().bitWords();
+  std::vector<bool> possible(grid.cells());
+  bool any = false;
+  for (uint32_t cell = 0; cell < finer.grid().cells(); ++cell) {
+    if (!isSet(occupied, cell)) continue;
+    const uint32_t half = n / 2, place[3] = {cell % n / 2, cell / n % n / 2, cell / (n * n) / 2};
+    possible[place[0] + half * (place[1] + half * place[2])] = true;
+    any = true;
+  }
+  if (any) level->exclude(possible);
+  return level;
 }
 
 bool MeshModel::allFinite() {
-  return field_.table().allFinite(device_) && field_.encoder().allFinite(device_) &&
-         field_.decoder().allFinite(device_) && displacements_.allFinite(device_);
+  bool finite =
+      field_.table().allFinite(device_) && field_.encoder().allFinite(device_) && field_.decoder().allFinite(device_);
+  for (const auto& level : levels_) finite = finite && level->displacements().allFinite(device_);
+  return finite;
 }
 
 void MeshModel::save(TensorSet& tensors, bool withMoments) {
-  for (const ParameterGroup* group : {&field_.table(), &field_.encoder(), &field_.decoder(), &displacements_}) {
+  for (const ParameterGroup* group : {&field_.table(), &field_.encoder(), &field_.decoder()}) {
     tensors.add(device_, *group, withMoments);
   }
-  tensors.add("occupancy.values", occupancy_.values());
-  tensors.add("occupancy.bits", occupancy_.bitWords());
+  for (const auto& level : levels_) level->save(tensors, withMoments);
 }
 
 void MeshModel::restore(const fs::path& path, const Safetensors& file) {
-  for (ParameterGroup* group : {&field_.table(), &field_.encoder(), &field_.decoder(), &displacements_}) {
+  for (ParameterGroup* group : {&field_.table(), &field_.encoder(), &field_.decoder()}) {
     loadGroup(device_, path, file, *group);
   }
-  const auto values = file.require(path, "occupancy.values", TensorType::f32).as<float>();
-  const auto bits = file.require(path, "occupancy.bits", TensorType::u32).as<uint32_t>();
-  if (values.size() != occupancy_.cells() || bits.size() != occupancy_.cells() / 32) {
-    throw Error(path.string(), "tensor occupancy.values", "has another resolution than the settings",
-                "restore the config.toml that the checkpoint was trained with, or train again");
+  levels_.resize(1);
+  levels_[0]->restore(path, file);
+  while (levels() < static_cast<uint32_t>(config_.meshLevels) &&
+         file.tensors.contains(MeshLevel::tensorPrefix(levels()) + "displacements")) {
+    levels_.push_back(makeLevel(levels(), std::vector<float>(size_t{3} * config_.grid(levels()).cells())));
+    levels_.back()->restore(path, file);
   }
-  occupancy_.restore(values, bits);
-  updateTracedCells();
-}
-
-std::vector<uint32_t> dilateCells(std::span<const uint32_t> bits, uint32_t cells) {
-  const size_t n = cells, all = n * n * n;
-  std::vector<uint8_t> marked(all);
-  for (size_t i = 0; i < all; ++i) marked[i] = bits[i / 32] >> i % 32 & 1;
-  size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis, stride *= n) {
-    const std::vector<uint8_t> before = marked;
-    for (size_t i = 0; i < all; ++i) {
-      const size_t place = i / stride % n;
-      if (place > 0) marked[i] |= before[i - stride];
-      if (place + 1 < n) marked[i] |= before[i + stride];
-    }
-  }
-  std::vector<uint32_t> dilated(bits.size());
-  for (size_t i = 0; i < all; ++i) dilated[i / 32] |= uint32_t{marked[i]} << i % 32;
-  return dilated;
 }
 
 std::unique_ptr<MeshModel> loadMeshModel(Device& device, const fs::path& folder) {

@@ -14,8 +14,9 @@ constexpr float kMinTransmittance = 1e-3f;
 
 }  // namespace
 
-MeshRenderer::MeshRenderer(MeshModel& model)
+MeshRenderer::MeshRenderer(MeshModel& model, uint32_t level)
     : model_(model),
+      level_(level),
       imageRays_(model.device(), kRays),
       hits_(model.device(), kRays, kSamples),
       counters_(model.device().array<uint32_t>(MeshHits::kCounters)) {
@@ -28,7 +29,7 @@ MeshRenderer::MeshRenderer(MeshModel& model)
 }
 
 std::vector<uint32_t> MeshRenderer::renderPiece(const ImageRays::Piece& piece) {
-  model_.trace({piece.rays, piece.origins, piece.directions, piece.far}, kMaxHits, hits_);
+  model_.level(level_).trace({piece.rays, piece.origins, piece.directions, piece.far}, kMaxHits, hits_);
   const MeshField::Output output =
       model_.field().forward(hits_.samples(), hits_.positions, piece.directions, hits_.rayOfSample, false);
   CompositeForward composite;

@@ -9,8 +9,8 @@ namespace tessera {
 
 class MeshRenderer final : public ViewRenderer {
  public:
-  // Keeps a reference to `model`.
-  explicit MeshRenderer(MeshModel& model);
+  // Renders one level of detail. Keeps a reference to `model`.
+  explicit MeshRenderer(MeshModel& model, uint32_t level = 0);
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override { return model_.device().name(); }
@@ -20,6 +20,7 @@ class MeshRenderer final : public ViewRenderer {
   std::vector<uint32_t> renderPiece(const ImageRays::Piece& piece);
 
   MeshModel& model_;
+  uint32_t level_;
   ImageRays imageRays_;
   MeshHits hits_;
   Array<uint32_t> counters_;

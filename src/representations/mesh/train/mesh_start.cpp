@@ -90,7 +90,7 @@ MeshStart findMeshStart(const Capture& capture, FieldModel& coarse, const MeshCo
   CullOptions options;
   options.stride = kPhotoStride;
   renderer.cullUnseen(capture, options);
-  start.cells = cellsWithSurfaces(coarse.device().read(renderer.cells()), coarse.space(), config.grid());
+  start.cells = cellsWithSurfaces(coarse.device().read(renderer.cells()), coarse.space(), config.grid(0));
   return start;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/random.h"
 #include "compute/composite.h"
 #include "representations/mesh/train/mesh_schedule.h"
 
@@ -11,7 +12,8 @@ namespace {
 
 constexpr uint32_t kCapacityPerDemand = 2;                // for steps that need more than the last one
 constexpr uint32_t kMaxTrainingHits = 256;                // of a ray
-constexpr uint32_t kLosses = 2 * PhotoLoss::kLosses + 1;  // of both images, and distortion
+constexpr uint32_t kLosses = 2 * PhotoLoss::kLosses + 1;  // of a level: of both images, and distortion
+constexpr uint32_t kRaysPerCoarseRay = 4;
 constexpr float kMinTrainingTransmittance = 1e-4f;
 constexpr double kFinalVertexFactor = 0.01;
 
@@ -32,17 +34,17 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
       photoRays_(device, capture, frame, raySettings(config)),
       photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config) {
-  model_.exclude(start.cells);
+  model_.level(0).exclude(start.cells);
   photoRays_.drawFrom(std::move(start.tiles));
   const uint32_t rays = static_cast<uint32_t>(config.maxRays);
   const uint32_t samples = kCapacityPerDemand * static_cast<uint32_t>(config.samplesPerStep);
   hits_ = MeshHits(device, rays, samples);
-  counters_ = device.array<uint32_t>(MeshHits::kCounters);
-  hits_.counters = counters_;
+  const size_t levels = static_cast<size_t>(config.meshLevels);
+  counters_ = device.array<uint32_t>(levels * MeshHits::kCounters);
   model_.field().reserve(samples);
   for (Array<float>* perRay : {&opacity_, &opaqueOpacity_}) *perRay = device.array<float>(rays);
   for (Array<float>* perRay : {&colour_, &opaqueColour_}) *perRay = device.array<float>(size_t{rays} * 3);
-  losses_ = device.array<float>(kLosses);
+  losses_ = device.array<float>(levels * kLosses);
   for (Array<float>* perSample : {&sampleWeights_, &sampleSteps_, &weightGradients_, &logitGradients_})
     *perSample = device.array<float>(samples);
   for (Array<float>* perSample : {&sampleColourGradients_, &positionGradients_})
@@ -51,14 +53,16 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
 
 void MeshTrainer::refreshOccupancy(int64_t step) {
   if (step % config_.occupancyEvery != 0 || step < config_.occupancyWarmupSteps) return;
-  model_.refreshOccupancy();
+  for (uint32_t level = 0; level < model_.levels(); ++level) model_.level(level).refreshOccupancy();
 }
 
 StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
   refreshOccupancy(step);
+  if (MeshSchedule::period(step, plannedSteps) > 0 && model_.levels() == 1)
+    model_.addCoarseLevels(mix64(static_cast<uint64_t>(config_.seed)));
   const uint32_t rays = budget_.rays();
   photoRays_.draw(step, rays);
-  addGradients(step, plannedSteps);
+  for (uint32_t level = 0; level < model_.levels(); ++level) addGradients(level, step, plannedSteps);
   updateParameters(step, plannedSteps);
 
   // The step is over, so its counters may be read.
@@ -78,51 +82,51 @@ StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
   return report;
 }
 
-void MeshTrainer::addGradients(int64_t step, int64_t plannedSteps) {
-  const uint32_t rays = photoRays_.count();
+void MeshTrainer::addGradients(uint32_t number, int64_t step, int64_t plannedSteps) {
+  const bool isFinest = number == 0, moves = step >= config_.vertexStartSteps && config_.vertexLearningRate > 0;
+  if (!isFinest && !moves) return;
+  const uint32_t rays = isFinest ? photoRays_.count() : std::max(1u, photoRays_.count() / kRaysPerCoarseRay);
   const Slice<const float> directions = photoRays_.directions(0, rays);
-  const MeshModel::Rays traced{rays, photoRays_.origins(0, rays), directions, {}};
-  model_.trace(traced, kMaxTrainingHits, hits_);
-  const Count samples = hits_.samples(), finished = hits_.finished(rays);
-  MeshField& field = model_.field();
-  const MeshField::Output output = field.forward(samples, hits_.positions, directions, hits_.rayOfSample, true);
-  model_.addOccupancy(traced, hits_, output.logits);
-  const double firstWeight = config_.opaqueLoss ? MeshSchedule::firstWeight(step, plannedSteps) : 1;
+  MeshLevel& level = model_.level(number);
+  hits_.counters = counters_.part(size_t{number} * MeshHits::kCounters, MeshHits::kCounters);
+  const MeshRays traced{rays, photoRays_.origins(0, rays), directions, {}};
+  level.trace(traced, kMaxTrainingHits, hits_);
+  const Count samples = hits_.samples();
+  const MeshField::Output output =
+      model_.field().forward(samples, hits_.positions, directions, hits_.rayOfSample, true);
+  level.addOccupancy(traced, hits_, output.logits);
 
+  // Losses are means over the rays of the step, of which this level may use a part.
+  const Batch batch{rays, isFinest, static_cast<double>(photoRays_.count()) / rays, output,
+                    losses_.part(size_t{number} * kLosses, kLosses)};
+  const double firstWeight = config_.opaqueLoss ? MeshSchedule::firstWeight(step, plannedSteps) : 1;
+  addVolumeLoss(batch, firstWeight);
+  addOpaqueLoss(batch, 1 - firstWeight, MeshSchedule::threshold(step, plannedSteps));
+  model_.field().backward(samples, hits_.positions, logitGradients_, Matrix<const float>(sampleColourGradients_, 3),
+                          isFinest, moves ? positionGradients_.all() : Slice<float>());
+  if (moves) level.backward(traced, hits_, positionGradients_);
+}
+
+void MeshTrainer::addVolumeLoss(const Batch& batch, double weight) {
+  const Count finished = hits_.finished(batch.rays);
   CompositeForward composite;
   composite.extinction = Extinction::logit;
   composite.offset = model_.opacityOffset();
   composite.minTransmittance = kMinTrainingTransmittance;
   composite.rays = finished;
   composite.firstSample = hits_.firstSample;
-  composite.x = output.logits;
-  composite.colours = output.colours;
+  composite.x = batch.output.logits;
+  composite.colours = batch.output.colours;
   composite.colour = colour_;
   composite.opacity = opacity_;
   composite.weights = sampleWeights_;
   device_.run(composite);
-  const PhotoLoss::Picture first{finished,
-                                 0,
-                                 rays,
-                                 colour_.part(0, size_t{3} * rays),
-                                 opacity_.part(0, rays),
-                                 true,
-                                 static_cast<float>(firstWeight)};
-  photoLoss_.compare(photoRays_, first, losses_.part(0, PhotoLoss::kLosses));
-  photoLoss_.passBack(photoRays_, first);
-  const Slice<float> distortionLoss = losses_.part(2 * PhotoLoss::kLosses, 1);
-  if (config_.distortionWeight > 0) {
-    DistortionLoss distortion;
-    distortion.scale = static_cast<float>(config_.distortionWeight) / static_cast<float>(rays);
-    distortion.rays = finished;
-    distortion.firstSample = hits_.firstSample;
-    distortion.weights = sampleWeights_;
-    distortion.distances = hits_.distances;
-    distortion.steps = sampleSteps_;  // zero: hits have no extent along the ray
-    distortion.loss = distortionLoss;
-    distortion.weightGradients = weightGradients_;
-    device_.run(distortion);
-  }
+  PhotoLoss::Picture picture{finished, 0, batch.rays, colour_.part(0, size_t{3} * batch.rays),
+                             opacity_.part(0, batch.rays)};
+  picture.weight = static_cast<float>(batch.mean * weight);
+  picture.trainsExposures = batch.isFinest;
+  photoLoss_.compare(photoRays_, picture, batch.losses.part(0, PhotoLoss::kLosses));
+  photoLoss_.passBack(photoRays_, picture);
 
   CompositeBackward back;
   back.extinction = composite.extinction;
@@ -130,55 +134,65 @@ void MeshTrainer::addGradients(int64_t step, int64_t plannedSteps) {
   back.minTransmittance = kMinTrainingTransmittance;
   back.rays = finished;
   back.firstSample = hits_.firstSample;
-  back.x = output.logits;
-  back.colours = output.colours;
-  back.rayColourGradients = photoLoss_.colourGradients(first);
-  back.rayOpacityGradients = photoLoss_.opacityGradients(first);
-  if (config_.distortionWeight > 0) back.weightGradients = weightGradients_;
+  back.x = batch.output.logits;
+  back.colours = batch.output.colours;
+  back.rayColourGradients = photoLoss_.colourGradients(picture);
+  back.rayOpacityGradients = photoLoss_.opacityGradients(picture);
+  if (config_.distortionWeight > 0) {
+    DistortionLoss distortion;
+    distortion.scale = static_cast<float>(config_.distortionWeight) / static_cast<float>(batch.rays);
+    distortion.rays = finished;
+    distortion.firstSample = hits_.firstSample;
+    distortion.weights = sampleWeights_;
+    distortion.distances = hits_.distances;
+    distortion.steps = sampleSteps_;  // zero: hits have no extent along the ray
+    distortion.loss = batch.losses.part(2 * PhotoLoss::kLosses, 1);
+    distortion.weightGradients = weightGradients_;
+    device_.run(distortion);
+    back.weightGradients = weightGradients_;
+  }
   back.xGradients = logitGradients_;
   back.colourGradients = Matrix<float>(sampleColourGradients_, 3);
   device_.run(back);
+}
 
-  const Slice<float> opaqueLosses = losses_.part(PhotoLoss::kLosses, PhotoLoss::kLosses);
-  if (firstWeight < 1) {
-    OpaqueForward opaque;
-    opaque.threshold = static_cast<float>(MeshSchedule::threshold(step, plannedSteps));
-    opaque.offset = composite.offset;
-    opaque.rays = finished;
-    opaque.firstSample = hits_.firstSample;
-    opaque.x = output.logits;
-    opaque.colours = output.colours;
-    opaque.colour = opaqueColour_;
-    opaque.opacity = opaqueOpacity_;
-    device_.run(opaque);
-    const PhotoLoss::Picture second{finished,
-                                    0,
-                                    rays,
-                                    opaqueColour_.part(0, size_t{3} * rays),
-                                    opaqueOpacity_.part(0, rays),
-                                    false,
-                                    static_cast<float>(1 - firstWeight)};
-    photoLoss_.compare(photoRays_, second, opaqueLosses);
-    photoLoss_.passBack(photoRays_, second);
-    OpaqueBackward opaqueBack;
-    opaqueBack.threshold = opaque.threshold;
-    opaqueBack.offset = opaque.offset;
-    opaqueBack.rays = finished;
-    opaqueBack.firstSample = hits_.firstSample;
-    opaqueBack.x = output.logits;
-    opaqueBack.colours = output.colours;
-    opaqueBack.colour = opaqueColour_;
-    opaqueBack.rayColourGradients = photoLoss_.colourGradients(second);
-    opaqueBack.xGradients = logitGradients_;
-    opaqueBack.colourGradients = back.colourGradients;
-    device_.run(opaqueBack);
-  } else {
-    device_.fillZero(opaqueLosses);
+void MeshTrainer::addOpaqueLoss(const Batch& batch, double weight, double threshold) {
+  const Slice<float> losses = batch.losses.part(PhotoLoss::kLosses, PhotoLoss::kLosses);
+  if (weight <= 0) {
+    device_.fillZero(losses);
+    return;
   }
-  const bool moves = step >= config_.vertexStartSteps && config_.vertexLearningRate > 0;
-  field.backward(samples, hits_.positions, logitGradients_, Matrix<const float>(sampleColourGradients_, 3),
-                 moves ? positionGradients_.all() : Slice<float>());
-  if (moves) model_.backward(traced, hits_, positionGradients_);
+  const Count finished = hits_.finished(batch.rays);
+  OpaqueForward opaque;
+  opaque.threshold = static_cast<float>(threshold);
+  opaque.offset = model_.opacityOffset();
+  opaque.rays = finished;
+  opaque.firstSample = hits_.firstSample;
+  opaque.x = batch.output.logits;
+  opaque.colours = batch.output.colours;
+  opaque.colour = opaqueColour_;
+  opaque.opacity = opaqueOpacity_;
+  device_.run(opaque);
+  PhotoLoss::Picture picture{finished, 0, batch.rays, opaqueColour_.part(0, size_t{3} * batch.rays),
+                             opaqueOpacity_.part(0, batch.rays)};
+  picture.standsBeforeBackgrounds = false;
+  picture.weight = static_cast<float>(batch.mean * weight);
+  picture.trainsExposures = batch.isFinest;
+  photoLoss_.compare(photoRays_, picture, losses);
+  photoLoss_.passBack(photoRays_, picture);
+
+  OpaqueBackward back;
+  back.threshold = opaque.threshold;
+  back.offset = opaque.offset;
+  back.rays = finished;
+  back.firstSample = hits_.firstSample;
+  back.x = batch.output.logits;
+  back.colours = batch.output.colours;
+  back.colour = opaqueColour_;
+  back.rayColourGradients = photoLoss_.colourGradients(picture);
+  back.xGradients = logitGradients_;
+  back.colourGradients = Matrix<float>(sampleColourGradients_, 3);
+  device_.run(back);
 }
 
 void MeshTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
@@ -199,7 +213,8 @@ void MeshTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
     vertices.rate = static_cast<float>(schedule.at(step, plannedSteps));
     vertices.skipZeroGradients = true;
     vertices.bound = 0.5f;  // a vertex stays in its cell
-    model_.displacements().step(device_, vertices);
+    for (uint32_t level = 0; level < model_.levels(); ++level)
+      model_.level(level).displacements().step(device_, vertices);
   }
   Adam exposureAdam;
   exposureAdam.rate = static_cast<float>(config_.exposureLearningRate * adam.rate / config_.learningRate);

@@ -25,7 +25,20 @@ class MeshTrainer final : public TrainableModel {
 
  private:
   void refreshOccupancy(int64_t step);
-  void addGradients(int64_t step, int64_t plannedSteps);
+  // Adds the gradients of a level of detail: of the networks and the vertices for the finest, of the vertices alone for
+  // the others, which use a part of the rays.
+  void addGradients(uint32_t level, int64_t step, int64_t plannedSteps);
+  // The hits of a level, in hits_, and what its losses need.
+  struct Batch {
+    uint32_t rays;  // the first ones of the step
+    bool isFinest;
+    double mean;  // factor of the weights of its losses
+    MeshField::Output output;
+    Slice<float> losses;
+  };
+  // The first loss, of all hits, sets the gradients of samples; the second, of opaque hits, adds to them.
+  void addVolumeLoss(const Batch& batch, double weight);
+  void addOpaqueLoss(const Batch& batch, double weight, double threshold);
   void updateParameters(int64_t step, int64_t plannedSteps);
 
   Device& device_;

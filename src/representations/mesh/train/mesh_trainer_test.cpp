@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "representations/field/testing/trained_cube.h"
 #include "representations/mesh/train/extraction.h"
@@ -21,6 +22,7 @@ MeshConfig smallMeshConfig() {
   config.gridFinest = 96;
   config.width = 16;
   config.meshCells = 16;
+  config.meshLevels = 2;
   config.occupancyWarmupSteps = 64;
   config.occupancyEvery = 8;
   config.vertexStartSteps = 40;
@@ -34,7 +36,7 @@ MeshConfig smallMeshConfig() {
 // Training that starts everywhere, from all pixels.
 MeshStart startEverywhere(const CubeScene& scene, const MeshConfig& config) {
   MeshStart start;
-  start.cells.assign(config.grid().cells(), true);
+  start.cells.assign(config.grid(0).cells(), true);
   start.tiles.resize(scene.capture().photos.size());
   for (const int photo : scene.capture().photosIn(Split::train))
     start.tiles[photo] = {{{photo, 0, 0, CubeScene::kWidth, CubeScene::kHeight}},
@@ -55,8 +57,8 @@ struct TrainedMesh {
   }
 };
 
-double heldOutPsnr(const CubeScene& scene, MeshModel& model) {
-  MeshRenderer renderer(model);
+double heldOutPsnr(const CubeScene& scene, MeshModel& model, uint32_t level = 0) {
+  MeshRenderer renderer(model, level);
   double sum = 0;
   const std::vector<int> photos = scene.capture().photosIn(Split::test);
   for (const int index : photos) {
@@ -74,6 +76,38 @@ TEST(MeshTrainer, LearnsWhatHeldOutPhotosSee) {
   EXPECT_GT(heldOutPsnr(scene, trained.trainer->model()), 17);
 }
 
+// Returns the networks, the table and the exposures of a checkpoint, and the finest level.
+std::map<std::string, Bytes> finestTensors(const Bytes& checkpoint) {
+  const auto file = decodeSafetensors(checkpoint);
+  std::map<std::string, Bytes> tensors;
+  for (const auto& [name, tensor] : file->tensors)
+    if (!name.starts_with("level") || name.starts_with("level0."))
+      tensors[name] = Bytes(tensor.bytes.begin(), tensor.bytes.end());
+  return tensors;
+}
+
+TEST(MeshTrainer, TrainsCoarseLevelsThatChangeNothingElse) {
+  const CubeScene scene;
+  MeshConfig config = smallMeshConfig(), alone = config;
+  config.meshLevels = 3;
+  alone.meshLevels = 1;
+  constexpr int64_t kSteps = 400;
+  TrainedMesh trained(scene, config, kSteps), single(scene, alone, kSteps);
+  EXPECT_EQ(finestTensors(trained.trainer->save(0)), finestTensors(single.trainer->save(0)));
+  MeshModel& model = trained.trainer->model();
+  ASSERT_EQ(model.levels(), 3u);
+  for (uint32_t number = 0; number < 3; ++number) {
+    MeshLevel& level = model.level(number);
+    EXPECT_EQ(level.grid().resolution, 16u >> number);
+    double largest = 0;
+    for (const float d : trained.device->read(level.displacements().values.all()))
+      largest = std::max(largest, std::abs(double{d}));
+    EXPECT_GT(largest, 0.1) << number;
+    EXPECT_LE(largest, 0.5) << number;
+    EXPECT_GT(heldOutPsnr(scene, model, number), 15) << number;
+  }
+}
+
 TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   const CubeScene scene;
   TrainedMesh trained(scene, smallMeshConfig(), 400);
@@ -86,21 +120,22 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   photos.photoStride = 1;
   ExtractionSettings all = photos;
   all.raysPerCell = 2;
-  const FaceSet some = extractFaces(model, scene.capture(), few), most = extractFaces(model, scene.capture(), photos),
-                faces = extractFaces(model, scene.capture(), all);
+  const FaceSet some = extractFaces(model, 0, scene.capture(), few),
+                most = extractFaces(model, 0, scene.capture(), photos),
+                faces = extractFaces(model, 0, scene.capture(), all);
   EXPECT_GT(some.count(), 50u);
   EXPECT_LT(some.count(), most.count());
   EXPECT_LT(most.count(), faces.count());
-  EXPECT_LT(faces.count(), 20 * model.grid().cells() / 10);
-  for (uint32_t face = 0; face < 20 * model.grid().cells(); ++face) {
+  EXPECT_LT(faces.count(), 20 * model.level(0).grid().cells() / 10);
+  for (uint32_t face = 0; face < 20 * model.level(0).grid().cells(); ++face) {
     EXPECT_LE(some.contains(face), most.contains(face)) << "rays were added";
     EXPECT_LE(most.contains(face), faces.contains(face)) << "rays were added";
   }
-  model.keepFaces(faces.bits());
+  model.level(0).keepFaces(faces.bits());
   EXPECT_GT(heldOutPsnr(scene, model), before - 1.5);
-  model.keepFaces(FaceSet(model.grid()).bits());
+  model.level(0).keepFaces(FaceSet(model.level(0).grid()).bits());
   EXPECT_LT(heldOutPsnr(scene, model), before - 3) << "without faces nothing is left";
-  model.keepFaces({});
+  model.level(0).keepFaces({});
   EXPECT_EQ(heldOutPsnr(scene, model), before);
 }
 
@@ -111,11 +146,12 @@ TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {
   TrainedMesh moved(scene, smallMeshConfig(), 400), unmoved(scene, still, 400);
   EXPECT_GT(heldOutPsnr(scene, moved.trainer->model()), heldOutPsnr(scene, unmoved.trainer->model()));
   double largest = 0;
-  for (const float d : moved.device->read(moved.trainer->model().displacements().values.all()))
+  for (const float d : moved.device->read(moved.trainer->model().level(0).displacements().values.all()))
     largest = std::max(largest, std::abs(double{d}));
   EXPECT_GT(largest, 0.1);
   EXPECT_LE(largest, 0.5);
-  for (const float d : unmoved.device->read(unmoved.trainer->model().displacements().values.all())) ASSERT_EQ(d, 0);
+  for (const float d : unmoved.device->read(unmoved.trainer->model().level(0).displacements().values.all()))
+    ASSERT_EQ(d, 0);
 }
 
 TEST(MeshTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
@@ -189,11 +225,12 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
   config.opacityOffset = 0;
   config.everyCell = true;
   MeshModel model(*device, config, {});
-  model.exclude(std::vector<bool>(config.grid().cells(), true));
+  MeshLevel& level = model.level(0);
+  level.exclude(std::vector<bool>(config.grid(0).cells(), true));
   // One ray straight down through the middle of a column of cells, whose first hit is opaque and the second is not.
   const Array<float> origins = device->uploadArray(std::vector<float>{0.07f, 0.05f, 3}),
                      directions = device->uploadArray(std::vector<float>{0, 0, -1});
-  const MeshModel::Rays rays{1, origins, directions, {}};
+  const MeshRays rays{1, origins, directions, {}};
   constexpr uint32_t kMaxHits = 200;
   MeshHits hits(*device, 1, kMaxHits);
   Array<uint32_t> counters = device->array<uint32_t>(MeshHits::kCounters);
@@ -201,15 +238,15 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
   std::vector<float> logits(kMaxHits, 5);
   logits[0] = 0;  // half opaque; the second hit leaves a transmittance below a hundredth
   const Array<float> opacities = device->uploadArray(logits);
-  model.trace(rays, kMaxHits, hits);
+  level.trace(rays, kMaxHits, hits);
   const uint32_t all = device->read(counters.all())[0];
   ASSERT_GT(all, 20u);
   const std::vector<float> positions = device->read(hits.positions.part(0, size_t{3} * all));
   for (int update = 0; update < 40; ++update) {
-    model.addOccupancy(rays, hits, Matrix<const float>(opacities.all(), 1));
-    model.refreshOccupancy();
+    level.addOccupancy(rays, hits, Matrix<const float>(opacities.all(), 1));
+    level.refreshOccupancy();
   }
-  std::vector<uint32_t> expected(config.grid().words());
+  std::vector<uint32_t> expected(config.grid(0).words());
   for (const uint32_t reached : {0u, 1u}) {
     uint32_t cell = 0;
     for (int axis = 2; axis >= 0; --axis) {
@@ -218,8 +255,8 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
     }
     expected[cell / 32] |= 1u << cell % 32;
   }
-  EXPECT_EQ(model.occupancy().bitWords(), expected);
-  model.trace(rays, kMaxHits, hits);
+  EXPECT_EQ(level.occupancy().bitWords(), expected);
+  level.trace(rays, kMaxHits, hits);
   EXPECT_LT(device->read(counters.all())[0], all / 2) << "hits beyond the surface and its neighbours";
 }
 

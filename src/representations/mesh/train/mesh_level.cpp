@@ -1,0 +1,155 @@
+#include "representations/mesh/train/mesh_level.h"
+
+#include <fmt/format.h>
+
+#include "base/error.h"
+#include "compute/occupancy.h"
+
+namespace tessera {
+namespace {
+
+// The space of an occupancy whose values are opacities.
+MarchSpace occupancySpace(const OctahedraGrid& grid) {
+  MarchSpace space;
+  space.contracted = false;
+  space.gridResolution = static_cast<int>(grid.resolution);
+  return space;
+}
+
+}  // namespace
+
+MeshHits::MeshHits(Device& device, uint32_t rays, uint32_t samples)
+    : firstSample(device.array<uint32_t>(rays + size_t{1})),
+      rayOfSample(device.array<uint32_t>(samples)),
+      faces(device.array<uint32_t>(samples)),
+      barycentrics(device.array<float>(size_t{2} * samples)),
+      positions(device.array<float>(size_t{3} * samples)),
+      distances(device.array<float>(samples)) {}
+
+MeshLevel::MeshLevel(Device& device, uint32_t number, const OctahedraGrid& grid, const Settings& settings,
+                     const std::vector<float>& displacements)
+    : device_(device),
+      prefix_(tensorPrefix(number)),
+      grid_(grid),
+      settings_(settings),
+      displacements_(device, prefix_ + "displacements", displacements),
+      occupancy_(device, occupancySpace(grid)),
+      tracedCells_(device.array<uint32_t>(grid.words())) {
+  CHECK(displacements.size() == size_t{3} * grid.cells());
+  updateTracedCells();
+}
+
+std::string MeshLevel::tensorPrefix(uint32_t number) {
+  return fmt::format("level{}.", number);
+}
+
+void MeshLevel::trace(const MeshRays& rays, uint32_t maximum, MeshHits& hits) {
+  CHECK(rays.count < hits.firstSample.size());
+  TraceOctahedra trace{grid_};
+  trace.rays = {rays.count};
+  trace.sampleCapacity = static_cast<uint32_t>(hits.distances.size());
+  trace.maximum = maximum;
+  trace.near = settings_.near;
+  trace.origins = rays.origins;
+  trace.directions = rays.directions;
+  trace.farOfRay = rays.far;
+  trace.displacements = displacements_.values;
+  trace.occupancy = tracedCells_;
+  if (keptFaces_.size() > 0) trace.keptFaces = keptFaces_;
+  trace.firstSample = hits.firstSample;
+  trace.sampleCount = hits.counters.part(0, 1);
+  trace.finishedRays = hits.counters.part(1, 1);
+  trace.rayOfSample = hits.rayOfSample;
+  trace.faces = hits.faces;
+  trace.barycentrics = hits.barycentrics;
+  trace.positions = hits.positions;
+  trace.distances = hits.distances;
+  device_.run(trace);
+}
+
+void MeshLevel::keepFaces(const std::vector<uint32_t>& bits) {
+  CHECK((bits.empty() || bits.size() == grid_.faceWords()));
+  keptFaces_ = device_.uploadArray(bits);
+}
+
+void MeshLevel::backward(const MeshRays& rays, const MeshHits& hits, Slice<const float> positionGradients) {
+  OctahedraBackward back{grid_};
+  back.samples = hits.samples();
+  back.minCosine = settings_.minCosine;
+  back.origins = rays.origins;
+  back.directions = rays.directions;
+  back.displacements = displacements_.values;
+  back.rayOfSample = hits.rayOfSample;
+  back.faces = hits.faces;
+  back.barycentrics = hits.barycentrics;
+  back.distances = hits.distances;
+  back.positionGradients = positionGradients;
+  back.displacementGradients = displacements_.gradients;
+  device_.run(back);
+}
+
+void MeshLevel::exclude(const std::vector<bool>& possible) {
+  occupancy_.exclude(possible);
+  occupancy_.fill(1);
+  updateTracedCells();
+}
+
+void MeshLevel::addOccupancy(const MeshRays& rays, const MeshHits& hits, Matrix<const float> logits) {
+  OccupancySamples samples;
+  samples.resolution = grid_.resolution;
+  samples.offset = settings_.opacityOffset;
+  samples.rays = hits.finished(rays.count);
+  samples.firstSample = hits.firstSample;
+  samples.x = logits;
+  samples.positions = hits.positions;
+  samples.grid = occupancy_.raisedBySamples();
+  device_.run(samples);
+}
+
+void MeshLevel::refreshOccupancy() {
+  constexpr float kThreshold = 0.05f;
+  occupancy_.update(settings_.occupancyDecay, kThreshold);
+  updateTracedCells();
+}
+
+void MeshLevel::updateTracedCells() {
+  device_.write(tracedCells_.all(), std::span<const uint32_t>(dilateCells(occupancy_.bitWords(), grid_.resolution)));
+}
+
+void MeshLevel::save(TensorSet& tensors, bool withMoments) {
+  tensors.add(device_, displacements_, withMoments);
+  tensors.add(prefix_ + "occupancy.values", occupancy_.values());
+  tensors.add(prefix_ + "occupancy.bits", occupancy_.bitWords());
+}
+
+void MeshLevel::restore(const fs::path& path, const Safetensors& file) {
+  loadGroup(device_, path, file, displacements_);
+  const auto values = file.require(path, prefix_ + "occupancy.values", TensorType::f32).as<float>();
+  const auto bits = file.require(path, prefix_ + "occupancy.bits", TensorType::u32).as<uint32_t>();
+  if (values.size() != occupancy_.cells() || bits.size() != occupancy_.cells() / 32) {
+    throw Error(path.string(), "tensor " + prefix_ + "occupancy.values", "has another resolution than the settings",
+                "restore the config.toml that the checkpoint was trained with, or train again");
+  }
+  occupancy_.restore(values, bits);
+  updateTracedCells();
+}
+
+std::vector<uint32_t> dilateCells(std::span<const uint32_t> bits, uint32_t cells) {
+  const size_t n = cells, all = n * n * n;
+  std::vector<uint8_t> marked(all);
+  for (size_t i = 0; i < all; ++i) marked[i] = bits[i / 32] >> i % 32 & 1;
+  size_t stride = 1;
+  for (int axis = 0; axis < 3; ++axis, stride *= n) {
+    const std::vector<uint8_t> before = marked;
+    for (size_t i = 0; i < all; ++i) {
+      const size_t place = i / stride % n;
+      if (place > 0) marked[i] |= before[i - stride];
+      if (place + 1 < n) marked[i] |= before[i + stride];
+    }
+  }
+  std::vector<uint32_t> dilated(bits.size());
+  for (size_t i = 0; i < all; ++i) dilated[i / 32] |= uint32_t{marked[i]} << i % 32;
+  return dilated;
+}
+
+}  // namespace tessera
