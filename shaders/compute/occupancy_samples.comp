@@ -18,7 +18,7 @@ void main() {
       const float alpha = computeOpacity(kLogit, a.x.data.values[elementIndex(a.x, i, 0)] + a.offset, 0);
       const uvec3 place = min(uvec3(pointAt(a.positions, i) * float(a.resolution)), uvec3(a.resolution - 1));
       const uint cell = place.x + a.resolution * (place.y + a.resolution * place.z);
-      if (!(a.grid.values[cell] < 0)) atomicMax(a.gridBits.values[cell], floatBitsToUint(alpha));
+      if (!(a.grid.values[cell] < 0) && alpha >= 0) atomicMax(a.gridBits.values[cell], floatBitsToUint(alpha));
       transmittance *= 1 - alpha;
     }
   }

@@ -25,7 +25,7 @@ void main() {
       stop = i + 1;
     }
     const float opacity = 1 - after;
-    if (!(opacity >= a.minOpacity)) continue;
+    if (!(opacity > 0 && opacity >= a.minOpacity)) continue;
     float rear = 0;
     bool isLast = true;
     for (uint i = stop; i-- > first;) {

@@ -23,7 +23,7 @@ void main() {
       transmittance *= 1 - alpha;
     }
     const float opacity = 1 - transmittance;
-    const bool counts = opacity >= a.minOpacity;
+    const bool counts = opacity > 0 && opacity >= a.minOpacity;
     a.opacity.values[ray] = counts ? opacity : 0;
     for (uint c = 0; c < 3; ++c) a.colour.values[3 * ray + c] = counts ? sum[c] / opacity : 0;
   }

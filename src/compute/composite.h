@@ -69,10 +69,11 @@ TESSERA_OPERATION(CompositeBackward);
 
 // Compositing of the second loss of UE4-NeRF (Gu et al. 2023, equations 4 to 6), which prepares surfaces for
 // rasterisers: only samples with α > threshold count, a ray ends after the sample that takes its opacity A = Σ w above
-// `maxOpacity`, and its colour is normalised, Σ w c / A. A ray with A < minOpacity has colour and opacity zero, and no
-// gradients. α is 1 / (1 + exp(-x - offset)).
+// `maxOpacity`, and its colour is normalised, Σ w c / A. A ray with A < minOpacity, or A = 0, has colour and opacity
+// zero, and no gradients. α is 1 / (1 + exp(-x - offset)).
 struct OpaqueForward {
-  float threshold = 0, maxOpacity = 0.8f, minOpacity = 1e-3f;
+  float threshold = 0, minOpacity = 1e-3f;
+  float maxOpacity = 0.8f;  // below 1
   float offset = 0;
   Count rays;
   Slice<const uint32_t> firstSample;  // [rays + 1]
@@ -85,7 +86,8 @@ TESSERA_OPERATION(OpaqueForward);
 
 // Adds to xGradients and colourGradients. There is no gradient through the threshold and the choice of the last sample.
 struct OpaqueBackward {
-  float threshold = 0, maxOpacity = 0.8f, minOpacity = 1e-3f;
+  float threshold = 0, minOpacity = 1e-3f;
+  float maxOpacity = 0.8f;  // below 1
   float offset = 0;
   Count rays;
   Slice<const uint32_t> firstSample;

@@ -44,10 +44,11 @@ std::vector<NamedOctahedra> octahedraGrids() {
 
 // Displacements up to the walls of the cells, or none.
 std::vector<float> randomDisplacements(Random& random, const OctahedraGrid& grid, float share) {
-  std::vector<float> displacements = random.floats(size_t{3} * grid.cells(), -0.5f * share, 0.5f * share);
+  std::vector<float> displacements =
+      random.floats(size_t{3} * grid.cells(), -kMaxDisplacement * share, kMaxDisplacement * share);
   if (share == 1)
     for (float& d : displacements)
-      if (random.below(10) == 0) d = random.below(2) ? 0.5f : -0.5f;
+      if (random.below(10) == 0) d = random.below(2) ? kMaxDisplacement : -kMaxDisplacement;
   return displacements;
 }
 

@@ -3,9 +3,10 @@
 //
 // A grid has N³ cells with one vertex each, which moves within its cell. Grid coordinates are in units of cells: cell
 // (i, j, k) fills [i, i+1] × [j, j+1] × [k, k+1], and its vertex lies at (i, j, k) + 0.5 + displacement, with each
-// component of the displacement in [-0.5, 0.5]. The octahedron of a cell has the vertices of the six cells beside it as
-// corners and the cell's own vertex as centre. It has 20 faces: 8 outer ones, and 12 inner ones, each of which joins
-// the centre with an edge. A face with a vertex outside the grid does not exist.
+// component of the displacement between -0.5 and 0.5, both excluded: faces in the wall between two cells would belong
+// to neither. The octahedron of a cell has the vertices of the six cells beside it as corners and the cell's own vertex
+// as centre. It has 20 faces: 8 outer ones, and 12 inner ones, each of which joins the centre with an edge. A face with
+// a vertex outside the grid does not exist.
 #pragma once
 
 #include <array>
@@ -19,6 +20,8 @@ namespace tessera {
 // Which cells carry an octahedron: those with an even i + j + k, so that octahedra and the tetrahedra between them fill
 // space, or all of them, so that faces overlap in space (each square between four cells is covered twice).
 enum class OctahedraPlacement { checkerboard, all };
+
+inline constexpr float kMaxDisplacement = 0.499f;  // to which training limits displacements
 
 struct OctahedraGrid {
   uint32_t resolution = 128;  // N, at most 512
@@ -70,9 +73,9 @@ std::vector<ReachingFace> reachingFaces(OctahedraPlacement placement, uint32_t p
 
 // Finds the hits of rays with the faces of a grid, in the order of their distance along the ray (equal distances: of
 // their face numbers). A hit exists if its distance is in (near, farOfRay) and its position lies in an occupied cell. A
-// ray within the plane of a face does not hit it. A ray keeps its nearest `maximum` hits. Rays are completed in order
-// as long as their hits fit; the first ray that would exceed `sampleCapacity` gets no hits, and neither do the rays
-// after it.
+// ray within the plane of a face does not hit it. A ray keeps its nearest `maximum` hits, and the nearest 64 in each
+// cell. Rays are completed in order as long as their hits fit; the first ray that would exceed `sampleCapacity` gets no
+// hits, and neither do the rays after it.
 struct TraceOctahedra {
   const OctahedraGrid& grid;
   Count rays;

@@ -212,7 +212,7 @@ void run(Context& context, const OpaqueForward& a) {
       const float opacityOfRay = forOpaqueSamples(a, x, ray, [&](uint32_t i, float alpha, float transmittance) {
         for (int c = 0; c < 3; ++c) sum[c] += transmittance * alpha * colours[a.colours.offset(i, c)];
       });
-      const bool counts = opacityOfRay >= a.minOpacity;
+      const bool counts = opacityOfRay > 0 && opacityOfRay >= a.minOpacity;
       opacity[ray] = counts ? opacityOfRay : 0;
       for (int c = 0; c < 3; ++c) colour[3 * ray + c] = counts ? sum[c] / opacityOfRay : 0;
     }
@@ -237,7 +237,7 @@ void run(Context& context, const OpaqueBackward& a) {
       const float opacity = forOpaqueSamples(a, x, ray, [&](uint32_t i, float alpha, float transmittance) {
         samples.push_back({i, alpha, transmittance});
       });
-      if (!(opacity >= a.minOpacity)) continue;
+      if (!(opacity > 0 && opacity >= a.minOpacity)) continue;
       float rear = 0;
       for (size_t k = samples.size(); k-- > 0;) {
         const auto [i, alpha, transmittance] = samples[k];

@@ -1,9 +1,9 @@
 // Octahedra grids on the CPU. A ray walks through the cells of the grid and, in each occupied cell, is tested against
 // all faces that can reach into that cell: those of the octahedra among the 27 cells around it. Hits outside the cell
 // are dropped, so that no face is hit twice and cells can be skipped. As vertices never leave their cells, nothing is
-// missed, and hits are sorted within a cell only.
+// missed but for rounding at the walls, and hits are sorted within a cell only.
 //
-// The test is that of Woop et al. 2013 (watertight ray/triangle intersection): the 27 vertices are sheared once so that
+// The test is that of Woop et al. 2013 (ray/triangle intersection): the 27 vertices are sheared once so that
 // the ray becomes the z axis; a face then needs three cross products. All faces are tested in vectors. The ray and the
 // cells are computed in double, and the faces in float relative to the point at which the ray enters the cell.
 
@@ -137,9 +137,9 @@ struct Table {
 
   explicit HWY_INLINE Table(const float* all) : values(all) {}
   HWY_INLINE Vector lookup(const int32_t* slots) const {
-    alignas(64) float hitCount[16];
-    for (size_t i = 0; i < hn::Lanes(Float()); ++i) hitCount[i] = values[slots[i]];
-    return hn::Load(Float(), hitCount);
+    alignas(64) float gathered[16];
+    for (size_t i = 0; i < hn::Lanes(Float()); ++i) gathered[i] = values[slots[i]];
+    return hn::Load(Float(), gathered);
   }
 #endif
 };

@@ -129,7 +129,7 @@ OpaqueRay opaqueRay(View alphas, double threshold, double maxOpacity, double min
     ray.before.push_back(transmittance);
     transmittance *= 1 - alphas[i];
   }
-  if (1 - transmittance >= minOpacity) {
+  if (transmittance < 1 && 1 - transmittance >= minOpacity) {
     ray.opacity = 1 - transmittance;
   } else {
     ray.samples.clear();

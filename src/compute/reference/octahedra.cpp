@@ -114,7 +114,7 @@ std::vector<FaceHit> traceOctahedra(const OctahedraGrid& grid, View displacement
                       ray.slope[1] * ray.start[3] - ray.start[1] * ray.slope[3],
                       ray.slope[2] * ray.start[3] - ray.start[2] * ray.slope[3]};  // parallel to the ray in the grid
   // A point of the ray in grid coordinates. The scale is not zero there, as the ray would lie at infinity otherwise.
-  const Point through = ray.start[3] != 0 ? ray.at(0) : ray.at(1);
+  const Point through = std::abs(ray.scaleAt(0)) >= std::abs(ray.scaleAt(1)) ? ray.at(0) : ray.at(1);
   const double square = dot3(line, line);
   if (square == 0) return hits;
   const uint32_t n = grid.resolution;

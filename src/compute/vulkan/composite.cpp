@@ -17,6 +17,7 @@ constexpr uint32_t kMaxColumns = 16;             // see composite.glsl
 // The arguments that OpaqueForward and OpaqueBackward share, except for those that need the device.
 template <class Options>
 arguments::OpaqueArguments opaqueArguments(const Options& options) {
+  CHECK(options.maxOpacity < 1.0f);  // the backward kernel divides by what is left
   arguments::OpaqueArguments arguments = {};
   arguments.threshold = options.threshold;
   arguments.maxOpacity = options.maxOpacity;

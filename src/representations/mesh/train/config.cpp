@@ -20,9 +20,10 @@ std::vector<ConfigField> MeshConfig::fields() {
       widthSetting(),
       hiddenSetting(),
       meshCellsSetting(),
-      meshLevelsSetting().within(1, maxLevels()),
+      meshLevelsSetting(),
       everyCellSetting(),
       opacityOffsetSetting(),
+      nearSetting().within(0, ConfigBounds::kHuge),
       seedSetting(),
       samplesPerStepSetting(),
       firstRaysSetting(),
@@ -30,7 +31,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       photoBudgetMiBSetting(),
       stepsPerPhotoSetting(),
       occupancyEverySetting(),
-      occupancyWarmupStepsSetting(),
+      occupancyStartStepsSetting(),
       occupancyDecaySetting(),
       learningRateSetting(),
       finalLearningRateFactorSetting(),
@@ -49,12 +50,6 @@ std::vector<ConfigField> MeshConfig::fields() {
   };
 }
 
-int MeshConfig::maxLevels() const {
-  int levels = 1;  // the cells of the coarsest level along an edge must be a multiple of 4
-  while (levels < 5 && (meshCells >> levels) % 4 == 0 && (meshCells >> levels) << levels == meshCells) ++levels;
-  return levels;
-}
-
 void MeshConfig::check() const {
   MeshConfig checked = *this;
   requireWithinBounds(checked.fields());
@@ -69,6 +64,12 @@ MeshFieldShape MeshConfig::shape() const {
   options.baseResolution = gridBase;
   options.finestResolution = gridFinest;
   return makeMeshFieldShape(options, width, hidden);
+}
+
+uint32_t MeshConfig::levels() const {
+  int levels = 1;
+  while (levels < meshLevels && meshCells % (4 << levels) == 0) ++levels;
+  return static_cast<uint32_t>(levels);
 }
 
 OctahedraGrid MeshConfig::grid(uint32_t level) const {

@@ -2,12 +2,10 @@
 #pragma once
 
 #include "compute/octahedra.h"
-#include "compute/rays.h"
 #include "representations/mesh/train/mesh_field.h"
 #include "train/settings/learning_rate.h"
 #include "train/settings/losses.h"
 #include "train/settings/networks.h"
-#include "train/settings/occupancy.h"
 #include "train/settings/rays.h"
 
 namespace tessera {
@@ -18,7 +16,6 @@ struct MeshConfig : RaySettings,
                     HashGridSettings,
                     NetworkSettings,
                     HiddenLayerSettings,
-                    OccupancySettings,
                     LearningRateSettings,
                     PhotoLossSettings,
                     DistortionSettings {
@@ -31,33 +28,39 @@ struct MeshConfig : RaySettings,
   SETTING(int, gridFeatures, 2, "grid_features", "features per hash entry", allowedValues({1, 2, 4, 8}));
   SETTING(int, meshCells, 64, "mesh_cells", "cells along an edge of the grid of octahedra",
           within(4, 256).withDivisor(4, 0));
-  SETTING(int, meshLevels, 5, "mesh_levels",
-          "levels of detail, each with cells twice as wide as those of the next finer one", within(1, 5).dependent());
+  SETTING(
+      int, meshLevels, 5, "mesh_levels",
+      "levels of detail, each with cells twice as wide as those of the next finer one; fewer if the number of cells "
+      "cannot be halved so often",
+      within(1, 5));
   SETTING(bool, everyCell, false, "every_cell",
           "every cell carries an octahedron, as the paper's text says; else every second one, so that none overlap",
           anything());
   SETTING(double, opacityOffset, -6, "opacity_offset", "added to the logit of opacity; nearly transparent at the start",
           within(-20, 20));
   // Training
+  SETTING(int, occupancyEvery, 16, "occupancy_every", "steps between updates of the occupancy", within(1, 1 << 30));
+  SETTING(int, occupancyStartSteps, 256, "occupancy_start_steps", "steps before cells can become empty",
+          within(0, 1 << 30));
   SETTING(double, occupancyDecay, 0.8, "occupancy_decay",
           "what remains of a cell's occupancy after an update unless a ray reaches a hit in it", share());
   SETTING(double, vertexLearningRate, 8e-3, "vertex_learning_rate",
           "learning rate of the vertices, in edges of a cell; falls to a hundredth", atLeast(0));
-  SETTING(int, vertexStartSteps, 500, "vertex_start_steps", "steps before the vertices begin to move",
+  SETTING(int, vertexStartSteps, 200, "vertex_start_steps", "steps before the vertices begin to move",
           within(0, 1 << 30));
   SETTING(double, minCosine, 0.1, "min_cosine",
           "a vertex is moved as if no ray hit its faces at a flatter angle than this cosine", share());
   SETTING(bool, opaqueLoss, true, "opaque_loss", "the second loss, which makes surfaces opaque", anything());
 
   MeshConfig();
-  // The number of levels that this number of cells can be divided into, at most 5.
-  int maxLevels() const;
   // In the order of config.toml.
   std::vector<ConfigField> fields();
   // Throws Error that names the first invalid setting.
   void check() const;
 
   MeshFieldShape shape() const;
+  // The number of levels: meshLevels, or as many as have a multiple of 4 cells along an edge.
+  uint32_t levels() const;
   // The grid of octahedra of a level, which fills the region of interest, [-1,1]³.
   OctahedraGrid grid(uint32_t level) const;
 };

@@ -35,7 +35,7 @@ std::unique_ptr<MeshLevel> MeshModel::makeLevel(uint32_t number, const std::vect
 }
 
 void MeshModel::addCoarseLevels(uint64_t seed) {
-  while (levels() < static_cast<uint32_t>(config_.meshLevels)) levels_.push_back(mergeLevel(levels(), seed));
+  while (levels() < config_.levels()) levels_.push_back(mergeLevel(levels(), seed));
 }
 
 std::unique_ptr<MeshLevel> MeshModel::mergeLevel(uint32_t number, uint64_t seed) {
@@ -83,17 +83,15 @@ std::unique_ptr<MeshLevel> MeshModel::mergeLevel(uint32_t number, uint64_t seed)
   device_.run(merge);
   std::unique_ptr<MeshLevel> level = makeLevel(number, device_.read(merged.all()));
 
-  // A cell may hold a surface if one of its children does.
-  const std::vector<uint32_t> occupied = finer.occupancy().bitWords();
+  // A cell may hold a surface if one of its children may.
+  const std::vector<float> occupancy = finer.occupancy().values();
   std::vector<bool> possible(grid.cells());
-  bool any = false;
   for (uint32_t cell = 0; cell < finer.grid().cells(); ++cell) {
-    if (!isSet(occupied, cell)) continue;
+    if (occupancy[cell] < 0) continue;  // excluded
     const uint32_t half = n / 2, place[3] = {cell % n / 2, cell / n % n / 2, cell / (n * n) / 2};
     possible[place[0] + half * (place[1] + half * place[2])] = true;
-    any = true;
   }
-  if (any) level->exclude(possible);
+  level->exclude(possible);
   return level;
 }
 
@@ -117,8 +115,7 @@ void MeshModel::restore(const fs::path& path, const Safetensors& file) {
   }
   levels_.resize(1);
   levels_[0]->restore(path, file);
-  while (levels() < static_cast<uint32_t>(config_.meshLevels) &&
-         file.tensors.contains(MeshLevel::tensorPrefix(levels()) + "displacements")) {
+  while (levels() < config_.levels() && file.tensors.contains(MeshLevel::tensorPrefix(levels()) + "displacements")) {
     levels_.push_back(makeLevel(levels(), std::vector<float>(size_t{3} * config_.grid(levels()).cells())));
     levels_.back()->restore(path, file);
   }

@@ -83,14 +83,14 @@ MeshStart findMeshStart(const Capture& capture, FieldModel& coarse, const MeshCo
     start.tiles[photo] = tilesOfPhoto(capture, photo, coarse.frame(), renderer);
     any = any || !start.tiles[photo].tiles.empty();
   }
-  if (!any) {
-    throw Error(capture.root.string(), "transforms.json", "no training photo shows a surface in the region of interest",
-                "check the camera poses, or enlarge the region with --set roi_margin=...");
-  }
   CullOptions options;
   options.stride = kPhotoStride;
   renderer.cullUnseen(capture, options);
   start.cells = cellsWithSurfaces(coarse.device().read(renderer.cells()), coarse.space(), config.grid(0));
+  if (!any || std::find(start.cells.begin(), start.cells.end(), true) == start.cells.end()) {
+    throw Error(capture.root.string(), "transforms.json", "no training photo shows a surface in the region of interest",
+                "check the camera poses and the masks, or enlarge the region with --set roi_margin=...");
+  }
   return start;
 }
 

@@ -16,6 +16,9 @@ constexpr uint32_t kLosses = 2 * PhotoLoss::kLosses + 1;  // of a level: of both
 constexpr uint32_t kRaysPerCoarseRay = 4;
 constexpr float kMinTrainingTransmittance = 1e-4f;
 constexpr double kFinalVertexFactor = 0.01;
+// With `--minutes`, the number of steps is known only after a quarter of the time: until then the rate must not depend
+// on it.
+constexpr double kConstantVertexFraction = 0.3;
 
 PhotoRays::Settings raySettings(const MeshConfig& config) {
   PhotoRays::Settings settings = config.photoRaySettings();
@@ -37,9 +40,10 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
   model_.level(0).exclude(start.cells);
   photoRays_.drawFrom(std::move(start.tiles));
   const uint32_t rays = static_cast<uint32_t>(config.maxRays);
-  const uint32_t samples = kCapacityPerDemand * static_cast<uint32_t>(config.samplesPerStep);
+  const uint32_t samples =  // at least one ray fits
+      std::max(kCapacityPerDemand * static_cast<uint32_t>(config.samplesPerStep), kMaxTrainingHits);
   hits_ = MeshHits(device, rays, samples);
-  const size_t levels = static_cast<size_t>(config.meshLevels);
+  const size_t levels = config.levels();
   counters_ = device.array<uint32_t>(levels * MeshHits::kCounters);
   model_.field().reserve(samples);
   for (Array<float>* perRay : {&opacity_, &opaqueOpacity_}) *perRay = device.array<float>(rays);
@@ -52,8 +56,11 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
 }
 
 void MeshTrainer::refreshOccupancy(int64_t step) {
-  if (step % config_.occupancyEvery != 0 || step < config_.occupancyWarmupSteps) return;
-  for (uint32_t level = 0; level < model_.levels(); ++level) model_.level(level).refreshOccupancy();
+  if (step % config_.occupancyEvery != 0 || step < config_.occupancyStartSteps) return;
+  for (uint32_t level = 0; level < model_.levels(); ++level) {
+    // Without hits of recent steps all cells would become empty, and none would be hit again.
+    if (level == 0 || movesVertices(step)) model_.level(level).refreshOccupancy();
+  }
 }
 
 StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
@@ -83,7 +90,7 @@ StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
 }
 
 void MeshTrainer::addGradients(uint32_t number, int64_t step, int64_t plannedSteps) {
-  const bool isFinest = number == 0, moves = step >= config_.vertexStartSteps && config_.vertexLearningRate > 0;
+  const bool isFinest = number == 0, moves = movesVertices(step);
   if (!isFinest && !moves) return;
   const uint32_t rays = isFinest ? photoRays_.count() : std::max(1u, photoRays_.count() / kRaysPerCoarseRay);
   const Slice<const float> directions = photoRays_.directions(0, rays);
@@ -204,15 +211,15 @@ void MeshTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   adam.l2 = static_cast<float>(config_.networkL2);
   model_.field().encoder().step(device_, adam);
   model_.field().decoder().step(device_, adam);
-  if (step >= config_.vertexStartSteps) {
+  if (movesVertices(step)) {
     RateSchedule schedule;
     schedule.rate = config_.vertexLearningRate;
     schedule.finalFactor = kFinalVertexFactor;
-    schedule.constantFraction = 0;
+    schedule.constantFraction = kConstantVertexFraction;
     Adam vertices;
     vertices.rate = static_cast<float>(schedule.at(step, plannedSteps));
     vertices.skipZeroGradients = true;
-    vertices.bound = 0.5f;  // a vertex stays in its cell
+    vertices.bound = kMaxDisplacement;
     for (uint32_t level = 0; level < model_.levels(); ++level)
       model_.level(level).displacements().step(device_, vertices);
   }

@@ -24,6 +24,7 @@ class MeshTrainer final : public TrainableModel {
   MeshModel& model() { return model_; }
 
  private:
+  bool movesVertices(int64_t step) const { return step >= config_.vertexStartSteps && config_.vertexLearningRate > 0; }
   void refreshOccupancy(int64_t step);
   // Adds the gradients of a level of detail: of the networks and the vertices for the finest, of the vertices alone for
   // the others, which use a part of the rays.

@@ -23,7 +23,7 @@ MeshConfig smallMeshConfig() {
   config.width = 16;
   config.meshCells = 16;
   config.meshLevels = 2;
-  config.occupancyWarmupSteps = 64;
+  config.occupancyStartSteps = 64;
   config.occupancyEvery = 8;
   config.vertexStartSteps = 40;
   config.samplesPerStep = 16384;
