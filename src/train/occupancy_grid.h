@@ -54,4 +54,7 @@ class OccupancyGrid {
   Array<float> logDensities_;
 };
 
+// Returns the cells of a grid, bits of [cells³], that are set or have a neighbour that is, diagonal ones included.
+std::vector<uint32_t> dilateCells(std::span<const uint32_t> bits, uint32_t cells);
+
 }  // namespace tessera

@@ -31,7 +31,7 @@ namespace tessera::cpu {
 inline constexpr int kVertices = 27;          // of the cells around a cell; dx + 1 + 3 (dy + 1) + 9 (dz + 1)
 inline constexpr int kSlots = 32;             // two vectors of 16; slots without a vertex hold NaN
 inline constexpr int kMaxCandidates = 112;    // a multiple of 16
-inline constexpr size_t kMaxHitsInCell = 64;  // the nearest are kept; 27 faces is the most seen on random grids
+inline constexpr size_t kMaxHitsInCell = 64;  // the nearest are kept
 
 // The faces that can reach into a cell.
 struct Candidates {

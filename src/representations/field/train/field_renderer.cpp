@@ -12,29 +12,13 @@ constexpr uint32_t kRays = 4096;        // maximum in one batch of the image's r
 constexpr uint32_t kSamples = 1 << 16;  // rays whose samples do not fit are rendered in the next batch
 static_assert(kSamples >= FieldConfig::kMaxSteps);
 
-// Returns the cells of a grid, [cells³], that are marked or have a marked neighbour, diagonal ones included.
-std::vector<bool> dilated(const std::vector<bool>& marked, int cells) {
-  std::vector<bool> result = marked;
-  const size_t strides[3] = {1, static_cast<size_t>(cells), static_cast<size_t>(cells) * static_cast<size_t>(cells)};
-  for (const size_t stride : strides) {
-    const std::vector<bool> before = result;
-    for (size_t i = 0; i < before.size(); ++i) {
-      if (!before[i]) continue;
-      const size_t place = i / stride % static_cast<size_t>(cells);
-      if (place > 0) result[i - stride] = true;
-      if (place + 1 < static_cast<size_t>(cells)) result[i + stride] = true;
-    }
-  }
-  return result;
-}
-
 }  // namespace
 
 // Marks the cells with samples that contribute to a pixel of a photo.
 class FieldRenderer::SeenCells final : public PixelVisitor {
  public:
   SeenCells(FieldRenderer& renderer, const CullOptions& options)
-      : marked(renderer.model_.occupancy().cells()),
+      : marked(renderer.model_.occupancy().cells() / 32),
         resolution_(renderer.model_.space().gridResolution),
         renderer_(renderer),
         options_(options) {}
@@ -49,7 +33,7 @@ class FieldRenderer::SeenCells final : public PixelVisitor {
     }
   }
 
-  std::vector<bool> marked;  // [cells of the model's occupancy]
+  std::vector<uint32_t> marked;  // as OccupancyGrid::bits
 
  private:
   // Returns the number of rays whose samples were marked.
@@ -64,12 +48,12 @@ class FieldRenderer::SeenCells final : public PixelVisitor {
       for (uint32_t s = first[ray]; s < first[ray + 1]; ++s) {
         const float alpha = weights[s] / std::max(transmittance, 1e-9f);
         transmittance -= weights[s];
-        if (weights[s] > options_.minWeight && alpha > options_.minAlpha)
-          marked[cell(&positions[size_t{3} * s])] = true;
+        if (weights[s] > options_.minWeight && alpha > options_.minAlpha) mark(cell(&positions[size_t{3} * s]));
       }
     }
     return counts.finished;
   }
+  void mark(size_t cell) { marked[cell / 32] |= 1u << (cell % 32); }
   size_t cell(const float position[3]) const {
     size_t number = 0;
     for (int axis = 2; axis >= 0; --axis) {
@@ -124,11 +108,10 @@ RoundCounts FieldRenderer::renderPiece(const ImageRays::Piece& piece) {
 void FieldRenderer::cullUnseen(const Capture& capture, const CullOptions& options) {
   SeenCells seen(*this, options);
   PhotoVisitor(capture, model_.frame(), kRays, seen).visitAll(options.stride, {}, [](int64_t, int64_t) {});
-  for (int i = 0; i < options.dilation; ++i) seen.marked = dilated(seen.marked, model_.space().gridResolution);
+  const auto cells = static_cast<uint32_t>(model_.space().gridResolution);
+  for (int i = 0; i < options.dilation; ++i) seen.marked = dilateCells(seen.marked, cells);
   std::vector<uint32_t> bits = model_.occupancy().bitWords();
-  for (size_t i = 0; i < seen.marked.size(); ++i) {
-    if (!seen.marked[i]) bits[i / 32] &= ~(1u << (i % 32));
-  }
+  for (size_t word = 0; word < bits.size(); ++word) bits[word] &= seen.marked[word];
   seenCells_ = model_.device().uploadArray(bits);
 }
 

@@ -134,22 +134,4 @@ void MeshLevel::restore(const fs::path& path, const Safetensors& file) {
   updateTracedCells();
 }
 
-std::vector<uint32_t> dilateCells(std::span<const uint32_t> bits, uint32_t cells) {
-  const size_t n = cells, all = n * n * n;
-  std::vector<uint8_t> marked(all);
-  for (size_t i = 0; i < all; ++i) marked[i] = bits[i / 32] >> i % 32 & 1;
-  size_t stride = 1;
-  for (int axis = 0; axis < 3; ++axis, stride *= n) {
-    const std::vector<uint8_t> before = marked;
-    for (size_t i = 0; i < all; ++i) {
-      const size_t place = i / stride % n;
-      if (place > 0) marked[i] |= before[i - stride];
-      if (place + 1 < n) marked[i] |= before[i + stride];
-    }
-  }
-  std::vector<uint32_t> dilated(bits.size());
-  for (size_t i = 0; i < all; ++i) dilated[i / 32] |= uint32_t{marked[i]} << i % 32;
-  return dilated;
-}
-
 }  // namespace tessera
