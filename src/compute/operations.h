@@ -8,6 +8,7 @@
 #include "compute/block_march.h"
 #include "compute/blocks.h"
 #include "compute/composite.h"
+#include "compute/cube_map.h"
 #include "compute/deferred.h"
 #include "compute/encodings.h"
 #include "compute/exposure.h"
@@ -80,6 +81,8 @@ namespace tessera {
   X(SparsityLoss)               \
   X(ExposureForward)            \
   X(ExposureBackward)           \
+  X(CubeMapForward)             \
+  X(CubeMapBackward)            \
   X(Adam)
 
 inline constexpr OperationId kAllOperations[] = {

@@ -54,10 +54,10 @@ class RooflineRecorder {
 
 void measureNetworks(RooflineRecorder& recorder);
 void measureHashGrids(RooflineRecorder& recorder, const HashGrid& grid);
-void measureSampleStreams(RooflineRecorder& recorder);  // encodings, marching, compaction, compositing
+void measureSampleStreams(RooflineRecorder& recorder);  // encodings, marching, compaction, compositing, cube maps
 void measureBlockStreams(RooflineRecorder& recorder);   // sampling through blocks and proposals
 void measureVirtualGrid(RooflineRecorder& recorder);
-void measureAttention(RooflineRecorder& recorder);         // marching in blocks, lattice, fusing levels, shading
+void measureAttention(RooflineRecorder& recorder);  // marching in blocks, lattice, fusing levels, shading
 void measureOctahedra(RooflineRecorder& recorder);
 void measureParameterStreams(RooflineRecorder& recorder);  // losses, exposure, occupancy, Adam
 

@@ -8,6 +8,7 @@
 #include "compute/adam.h"
 #include "compute/blend.h"
 #include "compute/composite.h"
+#include "compute/cube_map.h"
 #include "compute/encodings.h"
 #include "compute/exposure.h"
 #include "compute/losses.h"
@@ -289,6 +290,34 @@ void measureRays(RooflineRecorder& recorder, uint32_t capacity) {
                          });
 }
 
+// The map is small, so that only what rays read and write counts.
+void measureCubeMap(RooflineRecorder& recorder, uint32_t rays) {
+  Device& device = recorder.device();
+  constexpr uint32_t kResolution = 64;
+  const size_t numbers = size_t{18} * kResolution * kResolution;
+  Array<float> texels = recorder.randomFloats(numbers, 0, 1), texelGradients = device.array<float>(numbers);
+  Array<float> directions = recorder.randomFloats(size_t{rays} * 3, -1, 1),
+               colours = recorder.randomFloats(size_t{rays} * 3, -1, 1);
+  Array<float> opacity = recorder.randomFloats(rays, 0, 1);
+  const std::string shape = fmt::format("resolution {}, {}", kResolution, describeShape(rays, "rays"));
+  CubeMapBackward backward;
+  backward.resolution = kResolution;
+  backward.rays = {rays, {}};
+  backward.directions = directions;
+  backward.opacity = opacity;
+  backward.rayColourGradients = colours;
+  backward.texelGradients = texelGradients;
+  recorder.measureStream(kOperation<CubeMapBackward>, shape, rays * 28.0, [&] { device.run(backward); });
+
+  CubeMapForward forward;
+  forward.resolution = kResolution;
+  forward.rays = backward.rays;
+  forward.directions = directions;
+  forward.texels = texels;
+  forward.colours = colours;
+  recorder.measureStream(kOperation<CubeMapForward>, shape, rays * 24.0, [&] { device.run(forward); });
+}
+
 void measureLosses(RooflineRecorder& recorder, uint32_t rays) {
   Device& device = recorder.device();
   const std::string shape = describeShape(rays, "rays");
@@ -365,6 +394,7 @@ void measureSampleStreams(RooflineRecorder& recorder) {
   measureCompositing(recorder, lines);
   measureBlending(recorder, recorder.options().streamed / 8);
   measureRays(recorder, recorder.options().streamed);
+  measureCubeMap(recorder, recorder.options().streamed);
 }
 
 void measureParameterStreams(RooflineRecorder& recorder) {

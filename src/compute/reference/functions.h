@@ -110,6 +110,8 @@ Point gridVertex(const OctahedraGrid& grid, View displacements, uint32_t vertex)
 // coordinate is negative. Nothing if the line is parallel to the plane.
 std::optional<FaceHit> hitPlaneOfFace(const OctahedraGrid& grid, View displacements, const Point& origin,
                                       const Point& direction, uint32_t face);
+// The distance at which a ray leaves the box, or 0 if it does not cross it.
+double distanceBehindBox(const std::array<float, 3>& halfEdges, const Point& origin, const Point& direction);
 // Tries every face near the ray.
 std::vector<FaceHit> traceOctahedra(const OctahedraGrid& grid, View displacements, Indices occupancy,
                                     const Point& origin, const Point& direction, double near, double far);
@@ -191,6 +193,15 @@ struct OpaqueGradients {
 };
 OpaqueGradients compositeOpaqueBackward(View alphas, View colours, double threshold, double maxOpacity,
                                         double minOpacity, const Point& gradient);
+
+// cube_map.cpp: one direction
+struct CubeMapTexel {
+  uint32_t number = 0;
+  double weight = 0;
+};
+// The four texels around a direction; none for a direction of zero.
+std::vector<CubeMapTexel> cubeMapTexels(uint32_t resolution, const Point& direction);
+Point cubeMapColour(uint32_t resolution, View texels, const Point& direction);
 
 // virtual_grid.cpp
 struct VirtualCorner {

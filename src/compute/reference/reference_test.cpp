@@ -179,6 +179,46 @@ TEST(Blending, WeightsTheGatedSpecularColourOfABlockByItsOpacity) {
   EXPECT_NEAR(gated.depth, 1 + .75 * 4, 1e-15);
 }
 
+// The centre of each texel of each side is at a direction that is easy to write down.
+TEST(CubeMap, HasTheColourOfATexelInItsDirection) {
+  const uint32_t resolution = 4;
+  Doubles texels(6 * 4 * 4 * 3);
+  for (size_t i = 0; i < texels.size(); ++i) texels[i] = static_cast<double>(i);
+  const double places[4] = {-1, -1.0 / 3, 1.0 / 3, 1};
+  const double within = 1 - 1e-9;  // of the side, so that edges belong to no other
+  size_t texel = 0;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double sign : {1.0, -1.0})
+      for (const double v : places)
+        for (const double u : places) {
+          Point direction{};
+          direction[axis] = 7 * sign;
+          direction[(axis + 1) % 3] = 7 * within * u;
+          direction[(axis + 2) % 3] = 7 * within * v;
+          const Point colour = cubeMapColour(resolution, texels, direction);
+          for (size_t channel = 0; channel < 3; ++channel)
+            EXPECT_NEAR(colour[channel], texels[3 * texel + channel], 1e-6) << "texel " << texel;
+          ++texel;
+        }
+}
+
+TEST(CubeMap, MixesTheFourTexelsAroundADirection) {
+  Doubles texels(6 * 2 * 2 * 3);
+  const size_t side = 3;  // -y, whose columns are along z and rows along x
+  for (size_t i = 0; i < 4; ++i) texels[3 * (4 * side + i)] = std::array{1.0, 10.0, 100.0, 1000.0}[i];
+  // Column (0.5 + 1) / 2 = 0.75, row (-0.5 + 1) / 2 = 0.25.
+  EXPECT_NEAR(cubeMapColour(2, texels, {-1, -2, 1})[0], 0.75 * (0.25 + 7.5) + 0.25 * (25 + 750), 1e-12);
+}
+
+TEST(CubeMap, GivesEqualComponentsToTheFirstAxisAndNothingToZero) {
+  Doubles texels(6 * 2 * 2 * 3);
+  for (size_t i = 0; i < texels.size(); ++i) texels[i] = static_cast<double>(i / 12);  // the number of the side
+  EXPECT_EQ(cubeMapColour(2, texels, {-2, 2, 2})[0], 1);
+  EXPECT_EQ(cubeMapColour(2, texels, {1, -2, 2})[0], 3);
+  EXPECT_EQ(cubeMapColour(2, texels, {0, 0, -2})[0], 5);
+  EXPECT_TRUE(cubeMapTexels(2, {0, 0, 0}).empty());
+}
+
 TEST(ColourLoss, HasTheValuesOfItsFormulas) {
   EXPECT_NEAR(colourLoss(ColourLossKind::charbonnier, 1e-3, 0.001).value, 0.0014142136, 1e-10);
   EXPECT_NEAR(colourLoss(ColourLossKind::charbonnier, 1e-3, 0.1).value, 0.1000050, 1e-7);
