@@ -6,12 +6,23 @@ TESSERA_BEGIN_ARGUMENTS
 
 const uint kMaxReachingFaces = 112;
 
+// Of OctahedraGrid, what differs between the grids of one operation.
+struct OctahedraGridArguments {
+  float gridFromScene[16];
+  float lowest[3];  // within the grid
+  float highest[3];
+  float positionOffset[3];
+  float positionScale;
+};
+
 struct TraceOctahedraArguments {
   CountArguments rays;
   uint resolution;
   uint faceCount;  // of reachingFaces(), for cells of each parity
   uint maximum;
   float near;
+  uint gridCount;
+  float boxInFront[3];
   FloatPointer origins;
   FloatPointer directions;
   FloatPointer farOfRay;  // optional
@@ -28,12 +39,12 @@ struct TraceOctahedraArguments {
   FloatPointer barycentrics;
   FloatPointer positions;
   FloatPointer distances;
-  float gridFromScene[16];
+  OctahedraGridArguments grids[6];
   // reachingFaces(): from the lowest bits on, 2 bits each for the octahedron's x + 1, y + 1 and z + 1, then the local
   // number.
   uint faces[2 * 112];
 };
-TESSERA_SIZE(TraceOctahedraArguments, 1128);
+TESSERA_SIZE(TraceOctahedraArguments, 1704);
 
 struct OctahedraBackwardArguments {
   CountArguments samples;
@@ -49,9 +60,9 @@ struct OctahedraBackwardArguments {
   FloatPointer positionGradients;
   FloatPointer distanceGradients;  // optional
   SumPointer displacementGradients;
-  float gridFromScene[16];
+  OctahedraGridArguments grids[6];
 };
-TESSERA_SIZE(OctahedraBackwardArguments, 176);
+TESSERA_SIZE(OctahedraBackwardArguments, 736);
 
 struct MergeOctahedraArguments {
   uint resolution;

@@ -10,17 +10,20 @@
 layout(local_size_x = 64) in;
 KERNEL_ARGUMENTS(OctahedraBackwardArguments)
 
+#define MATRIX(i) arguments.values.grids[grid].gridFromScene[i]
+
 void main() {
   OctahedraBackwardArguments a = arguments.values;
   const int n = int(a.resolution);
   FOR_EACH_ROW(index, a.samples) {
-    const uint face = a.faces.values[index], cell = face / kFacesPerCell, ray = a.rayOfSample.values[index];
+    const uint face = a.faces.values[index], cells = n * n * n, grid = face / kFacesPerCell / cells;
+    const uint firstCell = grid * cells, cell = face / kFacesPerCell - firstCell, ray = a.rayOfSample.values[index];
     const ivec3 octahedron = ivec3(cell % n, cell / n % n, cell / (n * n));
     uint vertices[3];
     vec3 v[3];  // relative to the centre of the octahedron's cell
     for (uint corner = 0; corner < 3; ++corner) {
       const ivec3 offset = faceCorner(face % kFacesPerCell, corner), place = octahedron + offset;
-      vertices[corner] = place.x + n * (place.y + n * place.z);
+      vertices[corner] = firstCell + place.x + n * (place.y + n * place.z);
       v[corner] = vec3(offset) + pointAt(a.displacements, vertices[corner]);
     }
     const vec3 normal = cross(v[1] - v[0], v[2] - v[0]);
@@ -29,9 +32,9 @@ void main() {
     const float t = a.distances.values[index];
     vec4 start, rise;
     for (int row = 0; row < 4; ++row) {
-      const vec3 m = vec3(a.gridFromScene[4 * row], a.gridFromScene[4 * row + 1], a.gridFromScene[4 * row + 2]);
-      start[row] = dot(m, origin) + a.gridFromScene[4 * row + 3];
-      rise[row] = dot(m, direction);
+      const vec4 m = vec4(MATRIX(4 * row), MATRIX(4 * row + 1), MATRIX(4 * row + 2), MATRIX(4 * row + 3));
+      start[row] = dot(m, vec4(origin, 1));
+      rise[row] = dot(m.xyz, direction);
     }
     const vec4 at = start + t * rise;
     const vec3 slope = (rise.xyz - at.xyz / at.w * rise.w) / at.w;
@@ -39,7 +42,7 @@ void main() {
     const float least = a.minCosine * length(normal) * length(slope);
     if (abs(across) < least) across = across < 0 ? -least : least;
     if (across == 0) continue;
-    float along = dot(slope, pointAt(a.positionGradients, index)) / n;
+    float along = dot(slope, pointAt(a.positionGradients, index)) * arguments.values.grids[grid].positionScale;
     if (IS_SET(a.distanceGradients)) along += a.distanceGradients.values[index];
     const float second = a.barycentrics.values[2 * index], third = a.barycentrics.values[2 * index + 1];
     const vec3 shares = vec3(1 - second - third, second, third) * (along / across);

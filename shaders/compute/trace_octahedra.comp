@@ -24,6 +24,7 @@ const real kNever = real(1e30);
 // coordinate advances by 1 per unit of s.
 struct Ray {
   uint index, row, endRow;  // rows of its hits: none is written beyond, even if the second run rounds differently
+  uint grid, firstCell;     // whose coordinates these are
   real start[4], slope[4];
   real near, far;
   realVec3 entry, step_;
@@ -40,26 +41,44 @@ real coordinateAt(Ray ray, real t, int axis) {
   return (ray.start[axis] + t * ray.slope[axis]) / (ray.start[3] + t * ray.slope[3]);
 }
 
-// Limits [begin, end] to where all coordinates are in [0, n]. All six bounds are linear in t.
-void clipToGrid(Ray ray, real n, inout real begin, inout real end) {
+// Limits near and far of a ray to the box in which faces are hit. All six bounds are linear in t.
+void clipToGrid(inout Ray ray) {
   for (int axis = 0; axis < 3; ++axis) {
+    const real low = PARAMETERS.grids[ray.grid].lowest[axis], high = PARAMETERS.grids[ray.grid].highest[axis];
     for (int side = 0; side < 2; ++side) {
-      const real value = side == 1 ? n * ray.start[3] - ray.start[axis] : ray.start[axis];
-      const real rise = side == 1 ? n * ray.slope[3] - ray.slope[axis] : ray.slope[axis];
+      const real value = side == 1 ? high * ray.start[3] - ray.start[axis] : ray.start[axis] - low * ray.start[3];
+      const real rise = side == 1 ? high * ray.slope[3] - ray.slope[axis] : ray.slope[axis] - low * ray.slope[3];
       if (rise > 0) {
-        begin = max(begin, -value / rise);
+        ray.near = max(ray.near, -value / rise);
       } else if (rise < 0) {
-        end = min(end, -value / rise);
+        ray.far = min(ray.far, -value / rise);
       } else if (value < 0) {
-        end = -kNever;
+        ray.far = -kNever;
       }
     }
   }
 }
 
-bool isOccupied(ivec3 cell) {
+// The distance at which a ray leaves the box, or 0 if it does not cross it.
+real distanceBehindBox(vec3 origin, vec3 direction) {
+  real enter = 0, leave = kNever;
+  for (int axis = 0; axis < 3; ++axis) {
+    const real halfEdge = PARAMETERS.boxInFront[axis];
+    if (halfEdge <= 0) return real(0);
+    if (direction[axis] == 0) {
+      if (abs(origin[axis]) > halfEdge) return real(0);
+      continue;
+    }
+    const real side = direction[axis] > 0 ? halfEdge : -halfEdge;
+    enter = max(enter, (-side - real(origin[axis])) / real(direction[axis]));
+    leave = min(leave, (side - real(origin[axis])) / real(direction[axis]));
+  }
+  return enter < leave ? leave : real(0);
+}
+
+bool isOccupied(uint grid, ivec3 cell) {
   const uint n = PARAMETERS.resolution, i = cell.x + n * (cell.y + n * cell.z);
-  return (PARAMETERS.occupancy.values[i / 32] >> i % 32 & 1) != 0;
+  return (PARAMETERS.occupancy.values[grid * ((n * n * n + 31) / 32) + i / 32] >> i % 32 & 1) != 0;
 }
 
 // Finds the hits of a cell that the ray crosses from s = `enter` to `leave`, writes those that fit, and adds their number
@@ -82,7 +101,7 @@ bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
         exists = false;
         break;
       }
-      const vec3 at = vec3(place - cell) + pointAt(PARAMETERS.displacements, place.x + n * (place.y + n * place.z)) - origin;
+      const vec3 at = vec3(place - cell) + pointAt(PARAMETERS.displacements, ray.firstCell + place.x + n * (place.y + n * place.z)) - origin;
       v[corner] = vec3(at[x] - shearX * at[ray.z], at[y] - shearY * at[ray.z], at[ray.z] * sign_);
     }
     if (!exists) continue;
@@ -96,7 +115,7 @@ bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
     const real t_ = ray.entry[ray.z] + (enter + s) * ray.step_[ray.z];
     const real t = (t_ * ray.start[3] - ray.start[ray.z]) / (ray.slope[ray.z] - t_ * ray.slope[3]);
     if (!(t > ray.near && t < ray.far)) continue;
-    const uint face = (octahedron.x + n * (octahedron.y + n * octahedron.z)) * kFacesPerCell + local;
+    const uint face = (ray.firstCell + octahedron.x + n * (octahedron.y + n * octahedron.z)) * kFacesPerCell + local;
     if (IS_SET(PARAMETERS.keptFaces) && (PARAMETERS.keptFaces.values[face / 32] >> face % 32 & 1) == 0) continue;
     uint place = min(hitCount, kMaxHitsInCell - 1);
     if (hitCount == kMaxHitsInCell && s >= hits[place].s) continue;
@@ -114,7 +133,10 @@ bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
       if (IS_SET(PARAMETERS.rayOfSample)) PARAMETERS.rayOfSample.values[row] = ray.index;
       PARAMETERS.hitFaces.values[row] = hits[i].face;
       for (uint k = 0; k < 2; ++k) PARAMETERS.barycentrics.values[2 * row + k] = hits[i].barycentrics[k];
-      storePoint(PARAMETERS.positions, row, clamp(vec3(g / real(n)), 0, 1));
+      const vec3 offset = vec3(PARAMETERS.grids[ray.grid].positionOffset[0], PARAMETERS.grids[ray.grid].positionOffset[1],
+                               PARAMETERS.grids[ray.grid].positionOffset[2]);
+      storePoint(PARAMETERS.positions, row,
+                 clamp(vec3(g + realVec3(offset)) * PARAMETERS.grids[ray.grid].positionScale, 0, 1));
       PARAMETERS.distances.values[row] = float(t);
     }
     if (++count >= PARAMETERS.maximum) return false;
@@ -122,29 +144,28 @@ bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
   return true;
 }
 
-// Returns the number of hits of a ray.
-uint trace(uint index, uint row, uint endRow) {
-  const vec3 origin = pointAt(PARAMETERS.origins, index), direction = pointAt(PARAMETERS.directions, index);
-  if (direction == vec3(0) || PARAMETERS.maximum == 0) return 0;
+// Makes the ray of a grid, with the range of distances in which it has hits there.
+Ray rayInGrid(uint grid, vec3 origin, vec3 direction, real near, real far) {
   Ray ray;
-  ray.index = index;
-  ray.row = row;
-  ray.endRow = endRow;
+  ray.grid = grid;
+  ray.firstCell = grid * PARAMETERS.resolution * PARAMETERS.resolution * PARAMETERS.resolution;
   for (int i = 0; i < 4; ++i) {
-    ray.start[i] = PARAMETERS.gridFromScene[4 * i + 3];
+    ray.start[i] = PARAMETERS.grids[grid].gridFromScene[4 * i + 3];
     ray.slope[i] = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      ray.start[i] += real(PARAMETERS.gridFromScene[4 * i + axis]) * real(origin[axis]);
-      ray.slope[i] += real(PARAMETERS.gridFromScene[4 * i + axis]) * real(direction[axis]);
+      ray.start[i] += real(PARAMETERS.grids[grid].gridFromScene[4 * i + axis]) * real(origin[axis]);
+      ray.slope[i] += real(PARAMETERS.grids[grid].gridFromScene[4 * i + axis]) * real(direction[axis]);
     }
   }
-  ray.near = PARAMETERS.near;
-  ray.far = kNever;
-  if (IS_SET(PARAMETERS.farOfRay)) ray.far = min(ray.far, real(PARAMETERS.farOfRay.values[index]));
+  ray.near = near;
+  ray.far = far;
+  clipToGrid(ray);
+  return ray;
+}
+
+// Walks through the cells of a grid. Returns false if the ray has all hits that it may have.
+bool walk(Ray ray, inout uint count) {
   const int n = int(PARAMETERS.resolution);
-  real begin = ray.near, end = ray.far;
-  clipToGrid(ray, n, begin, end);
-  if (!(begin < end)) return 0;
   real largest = 0;
   ray.z = 0;
   realVec3 along;
@@ -155,32 +176,61 @@ uint trace(uint index, uint row, uint endRow) {
       ray.z = axis;
     }
   }
-  if (!(largest > 0)) return 0;
+  if (!(largest > 0)) return true;
   ray.step_ = along / largest;
   ivec3 cell;
   realVec3 next;
   for (int axis = 0; axis < 3; ++axis) {
-    ray.entry[axis] = clamp(coordinateAt(ray, begin, axis), real(0), real(n));
+    ray.entry[axis] = clamp(coordinateAt(ray, ray.near, axis), real(0), real(n));
     cell[axis] = min(int(ray.entry[axis]), n - 1);
     // On a wall between two cells, the ray is in the one that it enters.
     if (ray.step_[axis] < 0 && cell[axis] > 0 && ray.entry[axis] == cell[axis]) --cell[axis];
     const int side = ray.step_[axis] > 0 ? 1 : 0;
     next[axis] = ray.step_[axis] == 0 ? kNever : (cell[axis] + side - ray.entry[axis]) / ray.step_[axis];
   }
-  const real last = abs(coordinateAt(ray, end, ray.z) - ray.entry[ray.z]);
+  const real last = abs(coordinateAt(ray, ray.far, ray.z) - ray.entry[ray.z]);
   real s = 0;
-  uint count = 0;
   for (;;) {
     int axis = next.y < next.x ? 1 : 0;
     if (next.z < next[axis]) axis = 2;
     const real leave = next[axis];
-    if (isOccupied(cell) && !addHits(ray, cell, s, leave, count)) return count;
-    if (!(leave < last)) return count;
+    if (isOccupied(ray.grid, cell) && !addHits(ray, cell, s, leave, count)) return false;
+    if (!(leave < last)) return true;
     s = max(s, leave);
     cell[axis] += ray.step_[axis] > 0 ? 1 : -1;
-    if (cell[axis] < 0 || cell[axis] >= n) return count;
+    if (cell[axis] < 0 || cell[axis] >= n) return true;
     next[axis] = (cell[axis] + (ray.step_[axis] > 0 ? 1 : 0) - ray.entry[axis]) / ray.step_[axis];
   }
+}
+
+// Returns the number of hits of a ray.
+uint trace(uint index, uint row, uint endRow) {
+  const vec3 origin = pointAt(PARAMETERS.origins, index), direction = pointAt(PARAMETERS.directions, index);
+  if (direction == vec3(0) || PARAMETERS.maximum == 0) return 0;
+  const real near = max(real(PARAMETERS.near), distanceBehindBox(origin, direction));
+  real far = kNever;
+  if (IS_SET(PARAMETERS.farOfRay)) far = min(far, real(PARAMETERS.farOfRay.values[index]));
+  // The boxes of the grids are convex and do not overlap, so that a ray crosses them one after another.
+  uint count = 0;
+  uint walked = 0;  // bits of grids
+  for (uint turn = 0; turn < PARAMETERS.gridCount; ++turn) {
+    real nearest = kNever;
+    Ray ray;
+    for (uint grid = 0; grid < PARAMETERS.gridCount; ++grid) {
+      if ((walked >> grid & 1) != 0) continue;
+      const Ray other = rayInGrid(grid, origin, direction, near, far);
+      if (!(other.near < other.far && other.near < nearest)) continue;
+      nearest = other.near;
+      ray = other;
+    }
+    if (!(nearest < kNever)) break;
+    walked |= 1u << ray.grid;
+    ray.index = index;
+    ray.row = row;
+    ray.endRow = endRow;
+    if (!walk(ray, count)) break;
+  }
+  return count;
 }
 
 void storeNothing(uint ray, uint row) {

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "compute/memory.h"
@@ -30,12 +31,17 @@ struct OctahedraGrid {
   // matrix maps lines to lines and planes to planes, so that triangles are flat in the scene, too. The scene points
   // that it maps into the grid must have a positive last coordinate.
   std::array<float, 16> gridFromScene = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
+  // The box of grid coordinates in which faces are hit; beyond it they only complete the surfaces in the box.
+  std::array<float, 3> lowest = {0, 0, 0}, highest = {512, 512, 512};  // limited to the grid
+  // The positions of hits are (grid coordinates + positionOffset) · positionScale(), so that several grids can share
+  // one encoding.
+  std::array<float, 3> positionOffset = {0, 0, 0};
+  uint32_t positionCells = 0;  // 0: resolution
 
+  float positionScale() const { return 1.0f / static_cast<float>(positionCells > 0 ? positionCells : resolution); }
   uint32_t cells() const { return resolution * resolution * resolution; }
   // Bits of cells are those of MarchRays::occupancy: cell (i, j, k) at i + N (j + N k).
   uint32_t words() const { return (cells() + 31) / 32; }
-  // Words of the bits of faces, least significant first.
-  uint32_t faceWords() const { return (20 * cells() + 31) / 32; }
 };
 
 // Faces are numbered 20 · cell + local. Local numbers 0 to 7 are the outer faces: bit a is set if the corner along axis
@@ -71,30 +77,53 @@ struct ReachingFace {
 // cells. Their vertices lie in the 27 cells around it.
 std::vector<ReachingFace> reachingFaces(OctahedraPlacement placement, uint32_t parity);
 
-// Finds the hits of rays with the faces of a grid, in the order of their distance along the ray (equal distances: of
-// their face numbers). A hit exists if its distance is in (near, farOfRay) and its position lies in an occupied cell. A
-// ray within the plane of a face does not hit it. A ray keeps its nearest `maximum` hits, and the nearest 64 in each
-// cell. Rays are completed in order as long as their hits fit; the first ray that would exceed `sampleCapacity` gets no
-// hits, and neither do the rays after it.
+// Several grids with the same resolution and placement, whose boxes do not overlap in the scene. Cell c of grid g is
+// number g · cells() + c, also in the numbers of faces; the bits of its occupancy start at word g · words().
+using OctahedraGrids = std::span<const OctahedraGrid>;
+inline constexpr uint32_t kMaxOctahedraGrids = 6;
+// Words of the bits of all faces, least significant first.
+inline uint32_t faceWords(OctahedraGrids grids) {
+  return grids.empty() ? 0 : (kFacesPerCell * grids[0].cells() * static_cast<uint32_t>(grids.size()) + 31) / 32;
+}
+
+// The sides of a box around the origin of the scene, to which makeOutsideGrid refers: +x, -x, +y, -y, +z, -z.
+inline constexpr uint32_t kSides = 6;
+
+// Returns the grid of what lies beyond one side of a box with these half edges, seen from its centre: of the points
+// whose coordinate along the side's axis is the largest, in units of half edges. Its cells are cubes in the contracted
+// space of MERF (MarchSpace) of these units, with 2 · halfCells cells along an edge of the box; halfCells is at
+// least 4. Faces are hit up to the distance halfCells / 2 from the centre. The grid extends beyond the side's edges,
+// and into the box, by one cell, whose faces complete the surfaces there. Positions are (contracted + 2) / 4, so that
+// the grids of all sides share an encoding.
+OctahedraGrid makeOutsideGrid(uint32_t side, uint32_t halfCells, const std::array<float, 3>& halfEdges,
+                              OctahedraPlacement placement);
+
+// Finds the hits of rays with the faces of grids, in the order of their distance along the ray (equal distances: of
+// their face numbers). A hit exists if its distance is in (near, farOfRay), and its position in an occupied cell and in
+// the box of its grid. A ray within the plane of a face does not hit it. A ray keeps its nearest `maximum` hits, and
+// the nearest 64 in each cell. Rays are completed in order as long as their hits fit; the first ray that would exceed
+// `sampleCapacity` gets no hits, and neither do the rays after it.
 struct TraceOctahedra {
-  const OctahedraGrid& grid;
+  OctahedraGrids grids;
   Count rays;
   uint32_t sampleCapacity = 0;
   uint32_t maximum = 0xffffffffu;  // hits per ray
   float near = 0;
+  // If positive: half the edges of a box around the origin of the scene. A ray that crosses it has hits behind it only.
+  std::array<float, 3> boxInFront = {0, 0, 0};
   Slice<const float> origins;        // [rays][3], in the scene
   Slice<const float> directions;     // [rays][3]; zero: the ray has no hits
   Slice<const float> farOfRay;       // optional, [rays]
-  Slice<const float> displacements;  // [cells][3]
-  Slice<const uint32_t> occupancy;   // bits, [grid.words()]
-  Slice<const uint32_t> keptFaces;   // optional, bits, [grid.faceWords()]: only these faces are hit
+  Slice<const float> displacements;  // [grids][cells][3]
+  Slice<const uint32_t> occupancy;   // bits, [grids][words()]
+  Slice<const uint32_t> keptFaces;   // optional, bits, [faceWords(grids)]: only these faces are hit
   Slice<uint32_t> firstSample;       // [rays + 1]: hits of ray r are [firstSample[r], firstSample[r+1])
   Slice<uint32_t> sampleCount;       // [1]: total number of hits
   Slice<uint32_t> finishedRays;      // optional, [1]: number of rays that fit
   Slice<uint32_t> rayOfSample;       // optional, [sampleCapacity]
   Slice<uint32_t> faces;             // [sampleCapacity]
   Slice<float> barycentrics;         // [sampleCapacity][2], of the second and third vertex, in grid coordinates
-  Slice<float> positions;            // [sampleCapacity][3], grid coordinates / N, in [0,1]
+  Slice<float> positions;            // [sampleCapacity][3], in [0,1]
   Slice<float> distances;            // [sampleCapacity], in multiples of the direction's length
 };
 TESSERA_OPERATION(TraceOctahedra);
@@ -105,19 +134,19 @@ TESSERA_OPERATION(TraceOctahedra);
 // no gradient. Steep planes would move hits arbitrarily far: |n · g'| is taken as at least minCosine |n| |g'|, which is
 // no longer the gradient of the loss. Adds to `displacementGradients`.
 struct OctahedraBackward {
-  const OctahedraGrid& grid;
+  OctahedraGrids grids;
   Count samples;
   float minCosine = 0.1f;
   Slice<const float> origins;            // [rays][3]
   Slice<const float> directions;         // [rays][3]
-  Slice<const float> displacements;      // [cells][3]
+  Slice<const float> displacements;      // [grids][cells][3]
   Slice<const uint32_t> rayOfSample;     // [capacity]
   Slice<const uint32_t> faces;           // [capacity]
   Slice<const float> barycentrics;       // [capacity][2]
   Slice<const float> distances;          // [capacity]
   Slice<const float> positionGradients;  // [capacity][3], with respect to TraceOctahedra::positions
   Slice<const float> distanceGradients;  // optional, [capacity]
-  Slice<float> displacementGradients;    // [cells][3]
+  Slice<float> displacementGradients;    // [grids][cells][3]
 };
 TESSERA_OPERATION(OctahedraBackward);
 

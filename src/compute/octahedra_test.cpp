@@ -130,5 +130,46 @@ TEST(Octahedra, ReachIntoACellWithFaces) {
   }
 }
 
+TEST(Octahedra, CoverTheOutsideOfABoxWithoutGaps) {
+  constexpr uint32_t kHalfCells = 8;
+  const std::array<float, 3> halfEdges = {1, 0.5f, 0.75f};
+  for (double x = -3.9; x < 4; x += 0.7)
+    for (double y = -3.9; y < 4; y += 0.57)
+      for (double z = -2.9; z < 3; z += 0.63) {
+        const double scene[3] = {x * 0.9, y * 0.6, z};
+        double relative[3], largest = 0, contracted[3];
+        for (int axis = 0; axis < 3; ++axis) {
+          relative[axis] = scene[axis] / halfEdges[axis];
+          largest = std::max(largest, std::abs(relative[axis]));
+        }
+        for (int axis = 0; axis < 3; ++axis) {
+          contracted[axis] = relative[axis] / std::max(1.0, largest);
+          if (std::abs(relative[axis]) == largest && largest > 1)
+            contracted[axis] = std::copysign(2 - 1 / largest, relative[axis]);
+        }
+        int owners = 0;
+        for (uint32_t side = 0; side < kSides; ++side) {
+          const OctahedraGrid grid = makeOutsideGrid(side, kHalfCells, halfEdges, OctahedraPlacement::checkerboard);
+          double g[4];
+          for (int row = 0; row < 4; ++row) {
+            g[row] = grid.gridFromScene[4 * row + 3];
+            for (int column = 0; column < 3; ++column)
+              g[row] += double{grid.gridFromScene[4 * row + column]} * scene[column];
+          }
+          bool inside = true;
+          for (int axis = 0; axis < 3; ++axis) {
+            g[axis] /= g[3];
+            inside = inside && g[axis] >= grid.lowest[axis] && g[axis] < grid.highest[axis];
+          }
+          if (!inside) continue;
+          ++owners;
+          EXPECT_GT(g[3], 0);
+          for (int axis = 0; axis < 3; ++axis)
+            EXPECT_NEAR((g[axis] + grid.positionOffset[axis]) * grid.positionScale(), (contracted[axis] + 2) / 4, 1e-5);
+        }
+        EXPECT_EQ(owners, largest > 1 && largest < kHalfCells / 2 ? 1 : 0) << x << " " << y << " " << z;
+      }
+}
+
 }  // namespace
 }  // namespace tessera

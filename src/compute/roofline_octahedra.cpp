@@ -34,7 +34,7 @@ void measureOctahedra(RooflineRecorder& recorder) {
   Array<uint32_t> rayOfSample = device.array<uint32_t>(capacity), faces = device.array<uint32_t>(capacity);
   Array<float> barycentrics = device.array<float>(size_t{capacity} * 2), distances = device.array<float>(capacity),
                positions = device.array<float>(size_t{capacity} * 3);
-  TraceOctahedra trace{grid};
+  TraceOctahedra trace{{&grid, 1}};
   trace.rays = {rays};
   trace.sampleCapacity = capacity;
   trace.origins = origins;
@@ -55,7 +55,7 @@ void measureOctahedra(RooflineRecorder& recorder) {
   recorder.measureStream(kOperation<TraceOctahedra>, shape, bytes, [&] { device.run(trace); });
 
   Array<float> sums = device.array<float>(size_t{3} * grid.cells());
-  OctahedraBackward backward{grid};
+  OctahedraBackward backward{{&grid, 1}};
   backward.samples = {capacity, count};
   backward.origins = origins;
   backward.directions = directions;

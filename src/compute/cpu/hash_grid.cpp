@@ -367,13 +367,70 @@ void backwardLevel(const HashGridBackward& a, size_t l, HostRows samples, TableR
   }
 }
 
-// d value / d x_axis = scale · Σ over the corners of the face of weight⊥ · (upper - lower entry).
+// The products of the upstream gradients with the entries, [corner][sample]. gradients: [kGroup][features].
+using Products = float[8][kGroup];
+
+HWY_INLINE void multiplyPairs(const float* HWY_RESTRICT table, const Corners& corners,
+                              const float* HWY_RESTRICT gradients, Products& products) {
+  const Float d;
+  alignas(64) float values[8][2 * kGroup];
+  for (int c = 0; c < 8; ++c) {
+    for (int s = 0; s < kGroup; ++s) std::memcpy(&values[c][2 * s], table + 2 * size_t{corners.index[c][s]}, 8);
+  }
+  for (int s = 0; s < kGroup; s += static_cast<int>(hn::Lanes(d))) {
+    Vector g0, g1;
+    hn::LoadInterleaved2(d, gradients + 2 * s, g0, g1);
+    for (int c = 0; c < 8; ++c) {
+      Vector f0, f1;
+      hn::LoadInterleaved2(d, values[c] + 2 * s, f0, f1);
+      hn::Store(hn::MulAdd(g0, f0, hn::Mul(g1, f1)), d, products[c] + s);
+    }
+  }
+}
+
+void multiplyAny(const float* table, const Corners& corners, const float* gradients, int features, Products& products) {
+  for (int c = 0; c < 8; ++c) {
+    for (int s = 0; s < kGroup; ++s) {
+      products[c][s] = 0;
+      for (int f = 0; f < features; ++f)
+        products[c][s] += gradients[s * features + f] * table[size_t{corners.index[c][s]} * features + f];
+    }
+  }
+}
+
+// d value / d x_axis = scale · Σ over the corners of the face of weight⊥ · (upper - lower entry). Adds to
+// positionGradients, [kGroup][3].
+HWY_INLINE void addPositionGradients(float levelScale, const Corners& corners, const Products& products,
+                                     float* HWY_RESTRICT positionGradients) {
+  const Float d;
+  const Vector scale = hn::Set(d, levelScale);
+  const auto mix = [](Vector low, Vector high, Vector t) HWY_ATTR { return hn::MulAdd(t, hn::Sub(high, low), low); };
+  for (int s = 0; s < kGroup; s += static_cast<int>(hn::Lanes(d))) {
+    Vector dot[8];
+    for (int c = 0; c < 8; ++c) dot[c] = hn::Load(d, products[c] + s);
+    const Vector x = hn::Load(d, corners.fraction[0] + s), y = hn::Load(d, corners.fraction[1] + s),
+                 z = hn::Load(d, corners.fraction[2] + s);
+    const Vector alongX = mix(mix(hn::Sub(dot[1], dot[0]), hn::Sub(dot[3], dot[2]), y),
+                              mix(hn::Sub(dot[5], dot[4]), hn::Sub(dot[7], dot[6]), y), z);
+    const Vector alongY = mix(mix(hn::Sub(dot[2], dot[0]), hn::Sub(dot[3], dot[1]), x),
+                              mix(hn::Sub(dot[6], dot[4]), hn::Sub(dot[7], dot[5]), x), z);
+    const Vector alongZ = mix(mix(hn::Sub(dot[4], dot[0]), hn::Sub(dot[5], dot[1]), x),
+                              mix(hn::Sub(dot[6], dot[2]), hn::Sub(dot[7], dot[3]), x), y);
+    Vector sumX, sumY, sumZ;
+    hn::LoadInterleaved3(d, positionGradients + 3 * s, sumX, sumY, sumZ);
+    hn::StoreInterleaved3(hn::MulAdd(scale, alongX, sumX), hn::MulAdd(scale, alongY, sumY),
+                          hn::MulAdd(scale, alongZ, sumZ), d, positionGradients + 3 * s);
+  }
+}
+
 void backwardPositions(const HashGridBackward& a, size_t begin, size_t end) {
+  constexpr size_t kMaxFeatures = 8;
   const int features = a.grid.features;
   const float* positions = hostPointer(a.positions);
   float* out = hostPointer(a.positionGradients);
   Corners corners;
-  alignas(64) float padded[3 * kGroup];
+  alignas(64) float padded[3 * kGroup], paddedGradients[kMaxFeatures * kGroup] = {}, tail[3 * kGroup];
+  alignas(64) Products products;
   std::memset(out + 3 * begin, 0, sizeof(float) * 3 * (end - begin));
   for (size_t l = 0; l < a.grid.levels.size(); ++l) {
     const HashGridLevel& level = a.grid.levels[l];
@@ -381,25 +438,25 @@ void backwardPositions(const HashGridBackward& a, size_t begin, size_t end) {
     const float* gradients = hostPointer(a.encodedGradients.data) + l * a.encodedGradients.groupStride;
     for (size_t first = begin; first < end; first += kGroup) {
       cornersOfGroup(level, groupPositions(positions, first, end, padded), corners);
-      const int rows = static_cast<int>(std::min<size_t>(kGroup, end - first));
-      for (int s = 0; s < rows; ++s) {
-        float dot[8];  // upstream · entry, per corner
-        for (int c = 0; c < 8; ++c) {
-          dot[c] = 0;
-          for (int f = 0; f < features; ++f) {
-            dot[c] += gradients[(first + s) * features + f] * table[size_t{corners.index[c][s]} * features + f];
-          }
-        }
-        const float x = corners.fraction[0][s], y = corners.fraction[1][s], z = corners.fraction[2][s];
-        const auto mix = [](float low, float high, float t) { return low + t * (high - low); };
-        float* to = out + 3 * (first + s);
-        to[0] +=
-            level.scale * mix(mix(dot[1] - dot[0], dot[3] - dot[2], y), mix(dot[5] - dot[4], dot[7] - dot[6], y), z);
-        to[1] +=
-            level.scale * mix(mix(dot[2] - dot[0], dot[3] - dot[1], x), mix(dot[6] - dot[4], dot[7] - dot[5], x), z);
-        to[2] +=
-            level.scale * mix(mix(dot[4] - dot[0], dot[5] - dot[1], x), mix(dot[6] - dot[2], dot[7] - dot[3], x), y);
+      const size_t rows = std::min<size_t>(kGroup, end - first);
+      const float* upstream = gradients + first * features;
+      if (rows < kGroup) {
+        std::memcpy(paddedGradients, upstream, sizeof(float) * rows * features);
+        upstream = paddedGradients;
       }
+      if (features == 2) {
+        multiplyPairs(table, corners, upstream, products);
+      } else {
+        multiplyAny(table, corners, upstream, features, products);
+      }
+      if (rows == kGroup) {
+        addPositionGradients(level.scale, corners, products, out + 3 * first);
+        continue;
+      }
+      std::memset(tail, 0, sizeof(tail));
+      std::memcpy(tail, out + 3 * first, sizeof(float) * 3 * rows);
+      addPositionGradients(level.scale, corners, products, tail);
+      std::memcpy(out + 3 * first, tail, sizeof(float) * 3 * rows);
     }
   }
 }

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "compute/cpu/kernels.h"
@@ -90,12 +91,14 @@ struct HomogeneousRay {
       }
     }
   }
-  // Limits [*begin, *end] to where all coordinates are in [0, n]. All six bounds are linear in t.
-  void clip(double n, double* begin, double* end) const {
+  // Limits [*begin, *end] to the box in which faces are hit. All six bounds are linear in t.
+  void clip(const OctahedraGrid& grid, double* begin, double* end) const {
     for (int axis = 0; axis < 3; ++axis) {
+      const double low = std::max(0.0f, grid.lowest[axis]);
+      const double high = std::min(static_cast<float>(grid.resolution), grid.highest[axis]);
       for (const bool upper : {false, true}) {
-        const double value = upper ? n * start[3] - start[axis] : start[axis];
-        const double rise = upper ? n * slope[3] - slope[axis] : slope[axis];
+        const double value = upper ? high * start[3] - start[axis] : start[axis] - low * start[3];
+        const double rise = upper ? high * slope[3] - slope[axis] : slope[axis] - low * slope[3];
         if (rise > 0) {
           *begin = std::max(*begin, -value / rise);
         } else if (rise < 0) {
@@ -110,6 +113,22 @@ struct HomogeneousRay {
   // The parameter at which a coordinate has the value g.
   double parameterAt(double g, int axis) const { return (g * start[3] - start[axis]) / (slope[axis] - g * slope[3]); }
 };
+
+// Returns the distance at which a ray leaves TraceOctahedra::boxInFront, or 0 if it does not cross it.
+inline double distanceBehindBox(const std::array<float, 3>& halfEdges, const float* origin, const float* direction) {
+  if (halfEdges == std::array<float, 3>{}) return 0;
+  double enter = 0, leave = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0) {
+      if (std::abs(origin[axis]) > halfEdges[axis]) return 0;
+      continue;
+    }
+    const double side = std::copysign(double{halfEdges[axis]}, double{direction[axis]});
+    enter = std::max(enter, (-side - origin[axis]) / direction[axis]);
+    leave = std::min(leave, (side - origin[axis]) / direction[axis]);
+  }
+  return enter < leave ? leave : 0;
+}
 
 }  // namespace tessera::cpu
 #endif
@@ -144,30 +163,36 @@ struct Table {
 #endif
 };
 
-// The walk of one ray through the cells, in grid coordinates: g = entry + s · step, where the farthest coordinate
-// advances by 1 per unit of s.
+// The walk of one ray through the cells of a grid, in grid coordinates: g = entry + s · step, where the farthest
+// coordinate advances by 1 per unit of s.
 class Walk {
  public:
-  Walk(const TraceOctahedra& a, uint32_t ray, std::vector<OctahedraHit>& hits)
+  // The ray gets hits at distances in (near, far). `first`: the first one of the ray in `hits`.
+  Walk(const TraceOctahedra& a, uint32_t grid, uint32_t ray, double near, double far, size_t first,
+       std::vector<OctahedraHit>& hits)
       : a_(a),
+        grid_(a.grids[grid]),
+        firstCell_(grid * grid_.cells()),
         ray_(ray),
         hits_(hits),
-        first_(hits.size()),
-        line_(a.grid, hostPointer(a.origins) + 3 * size_t{ray}, hostPointer(a.directions) + 3 * size_t{ray}),
-        displacements_(hostPointer(a.displacements)),
+        first_(first),
+        line_(grid_, hostPointer(a.origins) + 3 * size_t{ray}, hostPointer(a.directions) + 3 * size_t{ray}),
+        displacements_(hostPointer(a.displacements) + size_t{3} * firstCell_),
+        occupancy_(hostPointer(a.occupancy) + size_t{grid} * grid_.words()),
         keptFaces_(hostPointer(a.keptFaces)),
-        n_(static_cast<int>(a.grid.resolution)) {
-    for (auto& numbers : sheared_) std::fill(numbers, numbers + kSlots, std::numeric_limits<float>::quiet_NaN());
+        n_(static_cast<int>(grid_.resolution)),
+        near_(near),
+        far_(far) {
+    line_.clip(grid_, &near_, &far_);
   }
 
-  void run() {
-    if (a_.maximum == 0) return;
-    double begin = a_.near, end = 1e30;
-    if (a_.farOfRay) end = std::min(end, double{hostPointer(a_.farOfRay)[ray_]});
-    near_ = begin;
-    far_ = end;
-    line_.clip(n_, &begin, &end);
-    if (!(begin < end)) return;
+  bool meetsGrid() const { return near_ < far_; }
+  double near() const { return near_; }
+
+  // Returns false if the ray has all hits that it may have.
+  bool run() {
+    for (auto& numbers : sheared_) std::fill(numbers, numbers + kSlots, std::numeric_limits<float>::quiet_NaN());
+    const double begin = near_, end = far_;
     double direction[3], largest = 0;
     for (int axis = 0; axis < 3; ++axis) {
       direction[axis] = line_.slope[axis] * line_.start[3] - line_.start[axis] * line_.slope[3];
@@ -176,7 +201,7 @@ class Walk {
         z_ = axis;
       }
     }
-    if (!(largest > 0)) return;
+    if (!(largest > 0)) return true;
     x_ = (z_ + 1) % 3;
     y_ = (z_ + 2) % 3;
     int cell[3];
@@ -194,18 +219,17 @@ class Walk {
       return (cell[axis] + (step_[axis] > 0 ? 1 : 0) - entry_[axis]) / step_[axis];
     };
     for (int axis = 0; axis < 3; ++axis) next[axis] = wall(axis);
-    const uint32_t* const bits = hostPointer(a_.occupancy);
     double s = 0;
     for (;;) {
       int axis = next[1] < next[0] ? 1 : 0;
       if (next[2] < next[axis]) axis = 2;
       const double leave = next[axis];
       const uint32_t index = static_cast<uint32_t>(cell[0] + n_ * (cell[1] + n_ * cell[2]));
-      if ((bits[index / 32] >> index % 32 & 1) != 0 && !addHits(cell, index, s, leave)) return;
-      if (!(leave < last)) return;
+      if ((occupancy_[index / 32] >> index % 32 & 1) != 0 && !addHits(cell, index, s, leave)) return false;
+      if (!(leave < last)) return true;
       s = std::max(s, leave);
       cell[axis] += step_[axis] > 0 ? 1 : -1;
-      if (cell[axis] < 0 || cell[axis] >= n_) return;
+      if (cell[axis] < 0 || cell[axis] >= n_) return true;
       next[axis] = wall(axis);
     }
   }
@@ -254,7 +278,7 @@ class Walk {
   // have.
   bool addHits(const int cell[3], uint32_t index, double enter, double leave) {
     shear(cell, enter);
-    const Candidates& faces = selectCandidates(a_.grid.placement, static_cast<uint32_t>(cell[0] + cell[1] + cell[2]));
+    const Candidates& faces = selectCandidates(grid_.placement, static_cast<uint32_t>(cell[0] + cell[1] + cell[2]));
     const Float d;
     const Vector zero = hn::Zero(d);
     const Table tableX(sheared_[0]), tableY(sheared_[1]);
@@ -289,7 +313,7 @@ class Walk {
         if (!(s >= enter && s < leave)) continue;
         const int8_t* const offset = faces.cell[face];
         const uint32_t octahedron = index + static_cast<uint32_t>(offset[0] + n_ * (offset[1] + n_ * offset[2]));
-        const uint32_t number = octahedron * kFacesPerCell + faces.local[face];
+        const uint32_t number = (firstCell_ + octahedron) * kFacesPerCell + faces.local[face];
         if (keptFaces_ && (keptFaces_[number / 32] >> number % 32 & 1) == 0) continue;
         const Near one{s, number, {edges[1][lane] / total, edges[2][lane] / total}};
         if (hitCount == kMaxHitsInCell && !(one < near[hitCount - 1])) continue;
@@ -305,7 +329,9 @@ class Walk {
       if (!(distance > near_ && distance < far_)) continue;
       hit.distance = static_cast<float>(distance);
       for (int axis = 0; axis < 3; ++axis)
-        hit.position[axis] = static_cast<float>(std::clamp((entry_[axis] + one.s * step_[axis]) / n_, 0.0, 1.0));
+        hit.position[axis] = std::clamp(
+            static_cast<float>(entry_[axis] + one.s * step_[axis] + grid_.positionOffset[axis]) * grid_.positionScale(),
+            0.0f, 1.0f);
       hits_.push_back(hit);
       if (hits_.size() - first_ >= a_.maximum) return false;
     }
@@ -313,21 +339,39 @@ class Walk {
   }
 
   const TraceOctahedra& a_;
+  const OctahedraGrid& grid_;
+  uint32_t firstCell_;  // of the grid
   uint32_t ray_;
   std::vector<OctahedraHit>& hits_;
   size_t first_;  // of the ray in hits_
   HomogeneousRay line_;
-  const float* displacements_;
-  const uint32_t* keptFaces_;      // null: all are
+  const float* displacements_;  // of the grid
+  const uint32_t* occupancy_;
+  const uint32_t* keptFaces_;      // of all grids; null: all are
   int n_, x_ = 0, y_ = 1, z_ = 2;  // z_: the axis along which the ray is longest
-  double near_ = 0, far_ = 0, entry_[3] = {}, step_[3] = {};
+  double near_, far_, entry_[3] = {}, step_[3] = {};
   alignas(64) float sheared_[3][kSlots];
 };
 
 void traceRay(const TraceOctahedra& a, uint32_t ray, std::vector<OctahedraHit>& hits) {
   const float* const direction = hostPointer(a.directions) + 3 * size_t{ray};
-  if (direction[0] == 0 && direction[1] == 0 && direction[2] == 0) return;
-  Walk(a, ray, hits).run();
+  if (a.maximum == 0 || (direction[0] == 0 && direction[1] == 0 && direction[2] == 0)) return;
+  const double near =
+      std::max(double{a.near}, distanceBehindBox(a.boxInFront, hostPointer(a.origins) + 3 * size_t{ray}, direction));
+  const double far = a.farOfRay ? std::min(1e30, double{hostPointer(a.farOfRay)[ray]}) : 1e30;
+  const size_t first = hits.size();
+  // The boxes of the grids are convex and do not overlap, so that a ray crosses them one after another.
+  std::array<std::pair<double, uint32_t>, kMaxOctahedraGrids> order;
+  size_t count = 0;
+  for (uint32_t grid = 0; grid < a.grids.size(); ++grid) {
+    const Walk walk(a, grid, ray, near, far, first, hits);
+    if (!walk.meetsGrid()) continue;
+    size_t place = count++;
+    for (; place > 0 && walk.near() < order[place - 1].first; --place) order[place] = order[place - 1];
+    order[place] = {walk.near(), grid};
+  }
+  for (size_t i = 0; i < count; ++i)
+    if (!Walk(a, order[i].second, ray, near, far, first, hits).run()) return;
 }
 
 }  // namespace tessera::cpu::HWY_NAMESPACE
@@ -342,13 +386,14 @@ namespace {
 
 constexpr size_t kRaysPerTask = 64;  // fixed; the hits of all tasks are concatenated in task order
 
-// A face's vertices, and where they lie in the grid.
+// A face's vertices, and where they lie in their grid.
 struct FaceVertices {
   uint32_t cell[3];
   double at[3][3];
 
   FaceVertices(const OctahedraGrid& grid, const float* displacements, uint32_t face) {
-    const uint32_t octahedron = face / kFacesPerCell, n = grid.resolution;
+    const uint32_t n = grid.resolution, cells = grid.cells(), firstCell = face / kFacesPerCell / cells * cells;
+    const uint32_t octahedron = face / kFacesPerCell - firstCell;
     const int centre[3] = {static_cast<int>(octahedron % n), static_cast<int>(octahedron / n % n),
                            static_cast<int>(octahedron / (n * n))};
     const auto corners = octahedronFace(face % kFacesPerCell);
@@ -361,6 +406,7 @@ struct FaceVertices {
         cell[corner] += stride * static_cast<uint32_t>(place);
         stride *= n;
       }
+      cell[corner] += firstCell;
       for (int axis = 0; axis < 3; ++axis) at[corner][axis] += displacements[3 * size_t{cell[corner]} + axis];
     }
   }
@@ -368,9 +414,11 @@ struct FaceVertices {
 
 // The face's normal, scaled so that a vertex's gradient is this times its barycentric coordinate.
 void scaledNormal(const OctahedraBackward& a, uint32_t sample, float out[3]) {
-  const FaceVertices face(a.grid, hostPointer(a.displacements), hostPointer(a.faces)[sample]);
+  const uint32_t number = hostPointer(a.faces)[sample];
+  const OctahedraGrid& grid = a.grids[number / kFacesPerCell / a.grids[0].cells()];
+  const FaceVertices face(grid, hostPointer(a.displacements), number);
   const size_t ray = hostPointer(a.rayOfSample)[sample];
-  const HomogeneousRay line(a.grid, hostPointer(a.origins) + 3 * ray, hostPointer(a.directions) + 3 * ray);
+  const HomogeneousRay line(grid, hostPointer(a.origins) + 3 * ray, hostPointer(a.directions) + 3 * ray);
   const double t = hostPointer(a.distances)[sample], scale = line.start[3] + t * line.slope[3];
   double normal[3], slope[3], across = 0, along = 0, normalSquare = 0, slopeSquare = 0;
   for (int axis = 0; axis < 3; ++axis) {
@@ -384,7 +432,7 @@ void scaledNormal(const OctahedraBackward& a, uint32_t sample, float out[3]) {
     slopeSquare += slope[axis] * slope[axis];
   }
   across = std::copysign(std::max(std::abs(across), a.minCosine * std::sqrt(normalSquare * slopeSquare)), across);
-  along /= a.grid.resolution;
+  along *= grid.positionScale();
   if (a.distanceGradients) along += hostPointer(a.distanceGradients)[sample];
   for (int axis = 0; axis < 3; ++axis)
     out[axis] = across == 0 ? 0.0f : static_cast<float>(along / across * normal[axis]);
@@ -393,6 +441,7 @@ void scaledNormal(const OctahedraBackward& a, uint32_t sample, float out[3]) {
 }  // namespace
 
 void run(Context& context, const TraceOctahedra& a) {
+  CHECK((a.grids.size() >= 1u && a.grids.size() <= kMaxOctahedraGrids));
   const uint32_t rays = hostCount(a.rays);
   const auto trace = HWY_DYNAMIC_DISPATCH(traceRay);
   uint32_t* const firstSample = hostPointer(a.firstSample);
@@ -435,7 +484,7 @@ void run(Context& context, const OctahedraBackward& a) {
   float* const sums = hostPointer(a.displacementGradients);
   const float* const barycentrics = hostPointer(a.barycentrics);
   for (size_t sample = 0; sample < samples; ++sample) {
-    const FaceVertices face(a.grid, hostPointer(a.displacements), hostPointer(a.faces)[sample]);
+    const FaceVertices face(a.grids[0], hostPointer(a.displacements), hostPointer(a.faces)[sample]);
     const float second = barycentrics[2 * sample], third = barycentrics[2 * sample + 1];
     const float shares[3] = {1 - second - third, second, third};
     for (int corner = 0; corner < 3; ++corner) {

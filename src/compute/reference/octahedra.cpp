@@ -48,6 +48,10 @@ struct GridRay {
   }
 };
 
+bool isBefore(const FaceHit& a, const FaceHit& b) {
+  return a.distance != b.distance ? a.distance < b.distance : a.face < b.face;
+}
+
 std::array<uint32_t, 3> cellOfFace(const OctahedraGrid& grid, uint32_t face) {
   const uint32_t cell = face / kFacesPerCell, n = grid.resolution;
   return {cell % n, cell / n % n, cell / (n * n)};
@@ -103,6 +107,21 @@ std::optional<FaceHit> hitPlaneOfFace(const OctahedraGrid& grid, View displaceme
   return hit;
 }
 
+double distanceBehindBox(const std::array<float, 3>& halfEdges, const Point& origin, const Point& direction) {
+  if (halfEdges == std::array<float, 3>{}) return 0;
+  double enter = 0, leave = std::numeric_limits<double>::infinity();
+  for (int axis = 0; axis < 3; ++axis) {
+    if (direction[axis] == 0) {
+      if (std::abs(origin[axis]) > halfEdges[axis]) return 0;
+      continue;
+    }
+    const double side = std::copysign(double{halfEdges[axis]}, direction[axis]);
+    enter = std::max(enter, (-side - origin[axis]) / direction[axis]);
+    leave = std::min(leave, (side - origin[axis]) / direction[axis]);
+  }
+  return enter < leave ? leave : 0;
+}
+
 std::vector<FaceHit> traceOctahedra(const OctahedraGrid& grid, View displacements, Indices occupancy,
                                     const Point& origin, const Point& direction, double near, double far) {
   std::vector<FaceHit> hits;
@@ -129,16 +148,15 @@ std::vector<FaceHit> traceOctahedra(const OctahedraGrid& grid, View displacement
       uint32_t place = 0, stride = 1;
       bool inside = true;
       for (int axis = 0; axis < 3; ++axis) {
-        inside = inside && hit->position[axis] >= 0 && hit->position[axis] < n;
+        const double g = hit->position[axis];
+        inside = inside && g >= std::max(0.0f, grid.lowest[axis]) && g < std::min<double>(n, grid.highest[axis]);
         place += stride * static_cast<uint32_t>(hit->position[axis]);
         stride *= n;
       }
       if (inside && (occupancy[place / 32] >> place % 32 & 1)) hits.push_back(*hit);
     }
   }
-  std::sort(hits.begin(), hits.end(), [](const FaceHit& a, const FaceHit& b) {
-    return a.distance != b.distance ? a.distance < b.distance : a.face < b.face;
-  });
+  std::sort(hits.begin(), hits.end(), isBefore);
   return hits;
 }
 
@@ -156,7 +174,7 @@ Doubles octahedraBackward(const OctahedraGrid& grid, View displacements, double 
   double across = dot3(normal, slope);
   across = std::copysign(std::max(std::abs(across), minCosine * lengths), across);
   if (across == 0) return gradients;
-  const double along = (distanceGradient + dot3(slope, positionGradient) / grid.resolution) / across;
+  const double along = (distanceGradient + dot3(slope, positionGradient) * grid.positionScale()) / across;
   for (int corner = 0; corner < 3; ++corner)
     for (int axis = 0; axis < 3; ++axis) gradients[3 * corner + axis] = along * hit.barycentrics[corner] * normal[axis];
   return gradients;
@@ -166,19 +184,32 @@ void run(const TraceOctahedra& a) {
   const size_t rays = hostCount(a.rays);
   const Doubles origins = doubles(a.origins, 3 * rays), directions = doubles(a.directions, 3 * rays);
   const Doubles farOfRay = doubles(a.farOfRay, rays);
-  const Doubles displacements = doubles(a.displacements, size_t{3} * a.grid.cells());
-  const Indices occupancy = indices(a.occupancy, a.grid.words());
+  const OctahedraGrid& first = a.grids.front();
+  const size_t cells = first.cells();
+  const Doubles displacements = doubles(a.displacements, 3 * cells * a.grids.size());
+  const Indices occupancy = indices(a.occupancy, first.words() * a.grids.size());
   Doubles barycentrics, positions, distances;
   uint32_t sampleCount = 0, finished = 0;
   bool full = false;
   hostPointer(a.firstSample)[0] = 0;
   for (size_t r = 0; r < rays; ++r) {
-    std::vector<FaceHit> hits =
-        traceOctahedra(a.grid, displacements, occupancy, {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]},
-                       {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]}, a.near,
-                       farOfRay.empty() ? 1e30 : farOfRay[r]);
+    const Point origin = {origins[3 * r], origins[3 * r + 1], origins[3 * r + 2]};
+    const Point direction = {directions[3 * r], directions[3 * r + 1], directions[3 * r + 2]};
+    const double near = std::max<double>(a.near, distanceBehindBox(a.boxInFront, origin, direction));
+    std::vector<FaceHit> hits;
+    for (size_t g = 0; g < a.grids.size(); ++g) {
+      for (FaceHit hit : traceOctahedra(a.grids[g], View(displacements).subspan(3 * cells * g, 3 * cells),
+                                        occupancy.subspan(first.words() * g, first.words()), origin, direction, near,
+                                        farOfRay.empty() ? 1e30 : farOfRay[r])) {
+        hit.face += static_cast<uint32_t>(kFacesPerCell * cells * g);
+        for (int axis = 0; axis < 3; ++axis)
+          hit.position[axis] = (hit.position[axis] + a.grids[g].positionOffset[axis]) * a.grids[g].positionScale();
+        hits.push_back(hit);
+      }
+    }
+    std::sort(hits.begin(), hits.end(), isBefore);
     if (a.keptFaces) {
-      const Indices faceBits = indices(a.keptFaces, a.grid.faceWords());
+      const Indices faceBits = indices(a.keptFaces, faceWords(a.grids));
       std::erase_if(hits, [&](const FaceHit& hit) { return (faceBits[hit.face / 32] >> hit.face % 32 & 1) == 0; });
     }
     if (hits.size() > a.maximum) hits.resize(a.maximum);
@@ -189,7 +220,7 @@ void run(const TraceOctahedra& a) {
         if (a.rayOfSample) hostPointer(a.rayOfSample)[sampleCount] = static_cast<uint32_t>(r);
         hostPointer(a.faces)[sampleCount++] = hit.face;
         barycentrics.insert(barycentrics.end(), hit.barycentrics.begin() + 1, hit.barycentrics.end());
-        for (const double g : hit.position) positions.push_back(g / a.grid.resolution);
+        positions.insert(positions.end(), hit.position.begin(), hit.position.end());
         distances.push_back(hit.distance);
       }
     }
@@ -203,8 +234,8 @@ void run(const TraceOctahedra& a) {
 }
 
 void run(const OctahedraBackward& a) {
-  const size_t samples = hostCount(a.samples);
-  const Doubles displacements = doubles(a.displacements, size_t{3} * a.grid.cells());
+  const size_t samples = hostCount(a.samples), cells = a.grids.front().cells();
+  const Doubles displacements = doubles(a.displacements, 3 * cells * a.grids.size());
   const Doubles barycentrics = doubles(a.barycentrics, 2 * samples), distances = doubles(a.distances, samples);
   const Doubles positionGradients = doubles(a.positionGradients, 3 * samples);
   const Doubles distanceGradients = doubles(a.distanceGradients, samples);
@@ -212,20 +243,23 @@ void run(const OctahedraBackward& a) {
   const auto pointAt = [](const auto& values, size_t i) {
     return Point{values[3 * i], values[3 * i + 1], values[3 * i + 2]};
   };
-  Doubles sums(size_t{3} * a.grid.cells());
+  Doubles sums(displacements.size());
   for (size_t s = 0; s < samples; ++s) {
     FaceHit hit;
-    hit.face = faces[s];
+    const size_t g = faces[s] / (kFacesPerCell * cells);
+    const OctahedraGrid& grid = a.grids[g];
+    hit.face = static_cast<uint32_t>(faces[s] - kFacesPerCell * cells * g);
     hit.distance = distances[s];
     hit.barycentrics = {1 - barycentrics[2 * s] - barycentrics[2 * s + 1], barycentrics[2 * s],
                         barycentrics[2 * s + 1]};
-    const Doubles gradients =
-        octahedraBackward(a.grid, displacements, a.minCosine, pointAt(hostPointer(a.origins), rayOfSample[s]),
-                          pointAt(hostPointer(a.directions), rayOfSample[s]), hit, pointAt(positionGradients, s),
-                          distanceGradients.empty() ? 0 : distanceGradients[s]);
-    const auto vertices = verticesOfFace(a.grid, hit.face);
+    const Doubles gradients = octahedraBackward(
+        grid, View(displacements).subspan(3 * cells * g, 3 * cells), a.minCosine,
+        pointAt(hostPointer(a.origins), rayOfSample[s]), pointAt(hostPointer(a.directions), rayOfSample[s]), hit,
+        pointAt(positionGradients, s), distanceGradients.empty() ? 0 : distanceGradients[s]);
+    const auto vertices = verticesOfFace(grid, hit.face);
     for (int corner = 0; corner < 3; ++corner)
-      for (int axis = 0; axis < 3; ++axis) sums[size_t{3} * (*vertices)[corner] + axis] += gradients[3 * corner + axis];
+      for (int axis = 0; axis < 3; ++axis)
+        sums[3 * (cells * g + (*vertices)[corner]) + axis] += gradients[3 * corner + axis];
   }
   add(a.displacementGradients, sums);
 }

@@ -17,6 +17,20 @@ namespace {
 
 constexpr uint32_t kOctahedraRowsPerGroup = 64;  // local_size_x of the kernels
 
+void copyGrids(OctahedraGrids grids, arguments::OctahedraGridArguments* to) {
+  CHECK((grids.size() >= 1u && grids.size() <= kMaxOctahedraGrids));
+  for (const OctahedraGrid& grid : grids) {
+    std::copy(grid.gridFromScene.begin(), grid.gridFromScene.end(), to->gridFromScene);
+    for (int axis = 0; axis < 3; ++axis) {
+      to->lowest[axis] = std::max(0.0f, grid.lowest[axis]);
+      to->highest[axis] = std::min(static_cast<float>(grid.resolution), grid.highest[axis]);
+    }
+    std::copy(grid.positionOffset.begin(), grid.positionOffset.end(), to->positionOffset);
+    to->positionScale = grid.positionScale();
+    ++to;
+  }
+}
+
 }  // namespace
 
 template <>
@@ -24,7 +38,9 @@ void VulkanDevice::enqueue(const TraceOctahedra& options) {
   const RayScratch scratch = rayScratch(options.rays.capacity);
   arguments::TraceOctahedraArguments arguments = {};
   arguments.rays = countArguments(options.rays);
-  arguments.resolution = options.grid.resolution;
+  arguments.resolution = options.grids[0].resolution;
+  arguments.gridCount = static_cast<uint32_t>(options.grids.size());
+  std::copy(options.boxInFront.begin(), options.boxInFront.end(), arguments.boxInFront);
   arguments.maximum = options.maximum;
   arguments.near = options.near;
   arguments.origins = deviceAddress(options.origins);
@@ -43,10 +59,10 @@ void VulkanDevice::enqueue(const TraceOctahedra& options) {
   arguments.barycentrics = deviceAddress(options.barycentrics);
   arguments.positions = deviceAddress(options.positions);
   arguments.distances = deviceAddress(options.distances);
-  std::copy(options.grid.gridFromScene.begin(), options.grid.gridFromScene.end(), arguments.gridFromScene);
+  copyGrids(options.grids, arguments.grids);
   uint32_t* to = arguments.faces;
   for (const uint32_t parity : {0u, 1u}) {
-    const std::vector<ReachingFace> faces = reachingFaces(options.grid.placement, parity);
+    const std::vector<ReachingFace> faces = reachingFaces(options.grids[0].placement, parity);
     arguments.faceCount = static_cast<uint32_t>(faces.size());
     CHECK(faces.size() <= arguments::kMaxReachingFaces);
     for (const ReachingFace& face : faces) {
@@ -68,7 +84,7 @@ template <>
 void VulkanDevice::enqueue(const OctahedraBackward& options) {
   arguments::OctahedraBackwardArguments arguments = {};
   arguments.samples = countArguments(options.samples);
-  arguments.resolution = options.grid.resolution;
+  arguments.resolution = options.grids[0].resolution;
   arguments.minCosine = options.minCosine;
   arguments.origins = deviceAddress(options.origins);
   arguments.directions = deviceAddress(options.directions);
@@ -80,7 +96,7 @@ void VulkanDevice::enqueue(const OctahedraBackward& options) {
   arguments.positionGradients = deviceAddress(options.positionGradients);
   arguments.distanceGradients = deviceAddress(options.distanceGradients);
   arguments.displacementGradients = deviceAddress(options.displacementGradients);
-  std::copy(options.grid.gridFromScene.begin(), options.grid.gridFromScene.end(), arguments.gridFromScene);
+  copyGrids(options.grids, arguments.grids);
   queue(sumKernel(kOctahedraBackwardFloatAtomicsSpirv, kOctahedraBackwardSpirv), arguments,
         countGroups(options.samples, kOctahedraRowsPerGroup));
 }
