@@ -12,6 +12,7 @@
 #include "representations/field/train/config.h"
 #include "representations/hash/train/config.h"
 #include "representations/list.h"
+#include "representations/mesh/train/config.h"
 #include "representations/volume/train/config.h"
 
 namespace tessera {
@@ -22,6 +23,7 @@ void forEachMethod(const Use& use) {
   use("field", FieldConfig());
   use("volume", VolumeConfig());
   use("hash", HashConfig());
+  use("mesh", MeshConfig());
 }
 
 TEST(Settings, AreTestedForAllMethods) {

@@ -22,5 +22,6 @@
 #define TESSERA_REPRESENTATIONS(TRAINED, SCENE) \
   TRAINED(field, Field)                         \
   SCENE(volume, Volume)                         \
-  SCENE(hash, Hash)
+  SCENE(hash, Hash)                             \
+  TRAINED(mesh, Mesh)
 // clang-format on

@@ -12,6 +12,7 @@
 #include "representations/field/testing/trained_cube.h"
 #include "representations/hash/testing/hash_cube.h"
 #include "representations/list.h"
+#include "representations/mesh/testing/small_mesh.h"
 #include "representations/volume/testing/volume_cube.h"
 #include "tiles/scene_folder.h"
 #include "train/run_folder.h"
@@ -31,6 +32,7 @@ std::unique_ptr<MethodSettings> smallSettings(const Method& method) {
   if (method.name == "field") return std::make_unique<SettingsOf<FieldConfig>>(cubeConfig());
   if (method.name == "volume") return std::make_unique<SettingsOf<VolumeConfig>>(smallVolumeConfig());
   if (method.name == "hash") return std::make_unique<SettingsOf<HashConfig>>(smallHashConfig());
+  if (method.name == "mesh") return std::make_unique<SettingsOf<MeshConfig>>(smallMeshConfig());
   ADD_FAILURE() << method.name << " has no settings for this test";
   return method.settings("");
 }

@@ -86,26 +86,33 @@ void removeOld(const fs::path& folder, int64_t step, int keep) {
 
 }  // namespace
 
+void ModelFolder::writeManifest(const ModelManifest& manifest) const {
+  const json text = {{"method", manifest.method},
+                     {"step", manifest.step},
+                     {"planned_steps", manifest.plannedSteps},
+                     {"files", manifest.files}};
+  writeFileAtomically(root_ / "manifest.json", text.dump(2) + "\n", true);
+}
+
 void ModelFolder::commit(const ModelManifest& state, uint32_t parts,
                          const std::function<std::optional<Bytes>(uint32_t)>& save, int keep) const {
   std::optional<ModelManifest> before;
-  json names = json::array();
+  ModelManifest now = state;
+  now.files.clear();
   for (uint32_t part = 0; part < parts; ++part) {
     const std::optional<Bytes> bytes = save(part);
     if (!bytes) {
       if (!before) before = manifest();
       CHECK(before.has_value());
       CHECK(part < before->files.size());
-      names.push_back(before->files[part]);
+      now.files.push_back(before->files[part]);
       continue;
     }
     const std::string name = fmt::format("blocks/{}/step-{}.safetensors", part, state.step);
     writeFileAtomically(root_ / name, *bytes, true);
-    names.push_back(name);
+    now.files.push_back(name);
   }
-  const json manifest = {
-      {"method", state.method}, {"step", state.step}, {"planned_steps", state.plannedSteps}, {"files", names}};
-  writeFileAtomically(root_ / "manifest.json", manifest.dump(2) + "\n", true);
+  writeManifest(now);
   for (uint32_t part = 0; part < parts; ++part) removeOld(root_ / "blocks" / std::to_string(part), state.step, keep);
 }
 

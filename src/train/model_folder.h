@@ -15,9 +15,10 @@ namespace tessera {
 
 struct ModelManifest {
   std::string method;
-  int64_t step = 0;                // steps done
-  int64_t plannedSteps = 0;        // 0 while it is not yet known, with `--minutes`
-  std::vector<std::string> files;  // checkpoints, relative to the folder, one per block
+  int64_t step = 0;          // steps done
+  int64_t plannedSteps = 0;  // 0 while it is not yet known, with `--minutes`
+  // Checkpoints, relative to the folder, one per block; manifests of a model that consists of models.
+  std::vector<std::string> files;
 };
 
 // The number of steps that was derived from `--minutes`. The steps before `plannedAtStep` were done without knowing it,
@@ -46,6 +47,8 @@ class ModelFolder {
 
   // Returns nothing if there is no manifest. Throws Error if the manifest is malformed or names a missing file.
   std::optional<ModelManifest> manifest() const;
+  // Writes the manifest. Throws Error if it cannot be written.
+  void writeManifest(const ModelManifest& manifest) const;
   // Writes the checkpoints one after another (`save` returns the bytes of each part, or nothing if the file that the
   // manifest names for it is still current), then the manifest, then removes all but the last `keep` checkpoints of
   // each part.

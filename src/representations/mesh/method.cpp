@@ -8,22 +8,23 @@ namespace {
 
 TrainingResult train(Device& device, const Capture& capture, const fs::path& model, const MethodSettings& settings,
                      const BlockRunOptions& options) {
-  return trainMesh(device, capture, model, {SettingsOf<MeshConfig>::in(settings), options.loop});
+  return trainMesh(device, capture, model, {options, SettingsOf<MeshConfig>::in(settings)});
 }
 
 std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
-  auto model = loadMeshModel(device, folder);
-  auto renderer = std::make_unique<MeshRenderer>(*model);
-  return std::make_unique<ModelWithRenderer<MeshModel, MeshRenderer>>(std::move(model), std::move(renderer));
+  auto mesh = std::make_unique<TrainedMesh>(loadTrainedMesh(device, folder));
+  auto renderer = std::make_unique<MeshRenderer>(*mesh);
+  return std::make_unique<ModelWithRenderer<TrainedMesh, MeshRenderer>>(std::move(mesh), std::move(renderer));
 }
 
 std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& settings) {
   const MeshConfig& config = SettingsOf<MeshConfig>::in(settings);
   const MeshFieldShape shape = config.shape();
-  return {{"parameters", shape.grid.parameters() + shape.encoder.parameters() + shape.decoder.parameters()},
-          {"vertices", config.grid(0).cells()},
-          {"multiply_accumulates_per_sample", 8 * shape.grid.columns() + countMultiplyAccumulates(shape.encoder)},
-          {"view_dependent_multiply_accumulates_per_sample", countMultiplyAccumulates(shape.decoder)}};
+  return {
+      {"parameters_per_block", shape.grid.parameters() + shape.encoder.parameters() + shape.decoder.parameters()},
+      {"vertices_per_block", uint64_t{static_cast<uint32_t>(config.meshCells)} * config.meshCells * config.meshCells},
+      {"multiply_accumulates_per_sample", 8 * shape.grid.columns() + countMultiplyAccumulates(shape.encoder)},
+      {"view_dependent_multiply_accumulates_per_sample", countMultiplyAccumulates(shape.decoder)}};
 }
 
 }  // namespace
@@ -32,6 +33,7 @@ const Method& meshMethod() {
   static const Method kMethod = {
       .name = "mesh",
       .summary = "triangles whose colours a small network decodes (UE4-NeRF)",
+      .trainsInBlocks = true,
       .settings = makeSettings<MeshConfig>,
       .train = train,
       .openModel = openModel,

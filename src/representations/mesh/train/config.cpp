@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "base/error.h"
+
 namespace tessera {
 
 MeshConfig::MeshConfig() {
@@ -10,8 +12,10 @@ MeshConfig::MeshConfig() {
 
 std::vector<ConfigField> MeshConfig::fields() {
   return {
-      roiMarginSetting(),
+      backgroundBlockSetting(),
       coarseStepsSetting(),
+      coarseShareSetting(),
+      backgroundShareSetting(),
       gridLevelsSetting().byDefault(16).within(1, 128 / std::max(1, gridFeatures)),
       gridFeaturesSetting(),
       gridLog2SizeSetting(),
@@ -20,6 +24,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       widthSetting(),
       hiddenSetting(),
       meshCellsSetting(),
+      backgroundCellsSetting(),
       meshLevelsSetting(),
       everyCellSetting(),
       opacityOffsetSetting(),
@@ -45,6 +50,9 @@ std::vector<ConfigField> MeshConfig::fields() {
       lossParameterSetting(),
       opaqueLossSetting(),
       distortionWeightSetting().byDefault(0.02),
+      depthWeightSetting(),
+      depthToleranceSetting(),
+      sparseDepthRayFractionSetting(),
       exposureSetting(),
       randomBackgroundSetting(),
   };
@@ -53,6 +61,9 @@ std::vector<ConfigField> MeshConfig::fields() {
 void MeshConfig::check() const {
   MeshConfig checked = *this;
   requireWithinBounds(checked.fields());
+  if (backgroundBlock == "own" || backgroundBlock == "none") return;
+  throw Error("--set background_block=" + backgroundBlock, "", "a mesh has no such background block",
+              "use own or none");
 }
 
 MeshFieldShape MeshConfig::shape() const {
@@ -67,17 +78,15 @@ MeshFieldShape MeshConfig::shape() const {
 }
 
 uint32_t MeshConfig::levels() const {
+  constexpr int kLeastCells = 8;  // so that half a cell is within the margin of a block
   int levels = 1;
-  while (levels < meshLevels && meshCells % (4 << levels) == 0) ++levels;
+  while (levels < meshLevels && meshCells % (4 << levels) == 0 && meshCells >> levels >= kLeastCells) ++levels;
   return static_cast<uint32_t>(levels);
 }
 
-OctahedraGrid MeshConfig::grid(uint32_t level) const {
-  OctahedraGrid grid{static_cast<uint32_t>(meshCells) >> level,
-                     everyCell ? OctahedraPlacement::all : OctahedraPlacement::checkerboard};
-  const float half = 0.5f * static_cast<float>(grid.resolution);
-  grid.gridFromScene = {half, 0, 0, half, 0, half, 0, half, 0, 0, half, half, 0, 0, 0, 1};
-  return grid;
+OctahedraDomain MeshConfig::domain(const MeshPart& part, uint32_t level) const {
+  return makeOctahedraDomain(part, static_cast<uint32_t>(part.isBackground() ? backgroundCells : meshCells) >> level,
+                             everyCell ? OctahedraPlacement::all : OctahedraPlacement::checkerboard);
 }
 
 }  // namespace tessera

@@ -3,6 +3,8 @@
 
 #include "compute/octahedra.h"
 #include "representations/mesh/train/mesh_field.h"
+#include "representations/mesh/train/mesh_part.h"
+#include "train/settings/blocks.h"
 #include "train/settings/learning_rate.h"
 #include "train/settings/losses.h"
 #include "train/settings/networks.h"
@@ -10,7 +12,8 @@
 
 namespace tessera {
 
-struct MeshConfig : RaySettings,
+struct MeshConfig : BackgroundBlockSettings,
+                    RaySettings,
                     RandomBackgroundSettings,
                     SampleBudgetSettings,
                     HashGridSettings,
@@ -18,16 +21,22 @@ struct MeshConfig : RaySettings,
                     HiddenLayerSettings,
                     LearningRateSettings,
                     PhotoLossSettings,
-                    DistortionSettings {
+                    DistortionSettings,
+                    DepthLossSettings {
   // Scene
-  SETTING(double, roiMargin, 1.0, "roi_margin", "region of interest relative to the one fitted to the capture",
-          within(1e-6, 1e6));
   SETTING(int64_t, coarseSteps, 1500, "coarse_steps",
-          "steps of the coarse field, which finds the surfaces that triangles start at", within(1, 1 << 30));
+          "steps of the coarse field, which finds the surfaces that triangles start at; without --minutes",
+          within(1, 1 << 30));
+  SETTING(double, coarseShare, 0.15, "coarse_share", "share of --minutes for the coarse field", within(0.01, 0.9));
+  SETTING(double, backgroundShare, 0.15, "background_share",
+          "share of --minutes, at most, or of the steps, for the background block", within(0.01, 0.9));
   // Model
   SETTING(int, gridFeatures, 2, "grid_features", "features per hash entry", allowedValues({1, 2, 4, 8}));
-  SETTING(int, meshCells, 64, "mesh_cells", "cells along an edge of the grid of octahedra",
-          within(4, 256).withDivisor(4, 0));
+  SETTING(int, meshCells, 64, "mesh_cells", "cells along an edge of a block's grid of octahedra",
+          within(8, 256).withDivisor(4, 0));
+  SETTING(int, backgroundCells, 64, "background_cells",
+          "cells along an edge of the region in the background block's grids of octahedra",
+          within(8, 128).withDivisor(4, 0));
   SETTING(
       int, meshLevels, 5, "mesh_levels",
       "levels of detail, each with cells twice as wide as those of the next finer one; fewer if the number of cells "
@@ -59,10 +68,10 @@ struct MeshConfig : RaySettings,
   void check() const;
 
   MeshFieldShape shape() const;
-  // The number of levels: meshLevels, or as many as have a multiple of 4 cells along an edge.
+  // The number of levels: meshLevels, or as many as have a multiple of 4 cells along an edge, at least 8.
   uint32_t levels() const;
-  // The grid of octahedra of a level, which fills the region of interest, [-1,1]³.
-  OctahedraGrid grid(uint32_t level) const;
+  bool hasBackground() const { return backgroundBlock == "own"; }
+  OctahedraDomain domain(const MeshPart& part, uint32_t level) const;
 };
 
 }  // namespace tessera

@@ -79,7 +79,7 @@ FaceMarker::FaceMarker(MeshModel& model, uint32_t level, const ExtractionSetting
     : model_(model),
       level_(level),
       settings_(settings),
-      faces_(model.level(level).grid()),
+      faces_(model.level(level).domain().grids),
       hits_(model.device(), kMaxRays, kExtractionSamples),
       counters_(model.device().array<uint32_t>(MeshHits::kCounters)),
       logits_(model.device().array<float>(kExtractionSamples)) {
@@ -90,7 +90,7 @@ FaceMarker::FaceMarker(MeshModel& model, uint32_t level, const ExtractionSetting
 uint32_t FaceMarker::mark(const MeshRays& rays) {
   constexpr uint32_t kMaxHits = 1024;  // of a ray
   Device& device = model_.device();
-  model_.level(level_).trace(rays, kMaxHits, hits_);
+  model_.level(level_).trace(rays, kMaxHits, false, hits_);
   model_.field().encode(hits_.samples(), hits_.positions, Matrix<float>(logits_, 1));
   const std::vector<uint32_t> counters = device.read(counters_.all());
   const uint32_t followed = counters[1];
@@ -115,7 +115,7 @@ FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, c
   PhotoFaces photos(model, marker);
   PhotoVisitor(capture, model.frame(), FaceMarker::kMaxRays, photos).visitAll(settings.photoStride, {}, onPhoto);
   if (settings.raysPerCell > 0) {
-    const double spacing = 2.0 / model.level(level).grid().resolution / settings.raysPerCell;
+    const double spacing = 2.0 / model.level(level).domain().grids[0].resolution / settings.raysPerCell;
     markParallel(model.device(), marker, -Vec3d::UnitZ(), spacing);
     for (const double degrees : kElevations) {
       const double elevation = degrees * std::numbers::pi / 180;

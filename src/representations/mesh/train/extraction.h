@@ -21,7 +21,7 @@ struct ExtractionSettings {
 class FaceSet {
  public:
   FaceSet() = default;
-  explicit FaceSet(const OctahedraGrid& grid) : bits_(grid.faceWords()) {}
+  explicit FaceSet(OctahedraGrids grids) : bits_(faceWords(grids)) {}
 
   void add(uint32_t face) { bits_[face / 32] |= 1u << face % 32; }
   bool contains(uint32_t face) const { return (bits_[face / 32] >> face % 32 & 1) != 0; }
@@ -54,8 +54,8 @@ class FaceMarker {
   Array<float> logits_;
 };
 
-// Returns the faces of a level that the training photos of `capture` and parallel rays see. Throws Error if a mask
-// cannot be read.
+// Returns the faces of a level of a block that the training photos of `capture` and parallel rays see. Throws Error if
+// a mask cannot be read.
 FaceSet extractFaces(
     MeshModel& model, uint32_t level, const Capture& capture, const ExtractionSettings& settings,
     const std::function<void(int64_t done, int64_t all)>& onPhoto = [](int64_t, int64_t) {});

@@ -9,10 +9,10 @@ namespace tessera {
 namespace {
 
 // The space of an occupancy whose values are opacities.
-MarchSpace occupancySpace(const OctahedraGrid& grid) {
+MarchSpace occupancySpace(const OctahedraDomain& domain) {
   MarchSpace space;
   space.contracted = false;
-  space.gridResolution = static_cast<int>(grid.resolution);
+  space.gridResolution = static_cast<int>(domain.latticeCells());
   return space;
 }
 
@@ -26,16 +26,16 @@ MeshHits::MeshHits(Device& device, uint32_t rays, uint32_t samples)
       positions(device.array<float>(size_t{3} * samples)),
       distances(device.array<float>(samples)) {}
 
-MeshLevel::MeshLevel(Device& device, uint32_t number, const OctahedraGrid& grid, const Settings& settings,
+MeshLevel::MeshLevel(Device& device, uint32_t number, OctahedraDomain domain, const Settings& settings,
                      const std::vector<float>& displacements)
     : device_(device),
       prefix_(tensorPrefix(number)),
-      grid_(grid),
+      domain_(std::move(domain)),
       settings_(settings),
       displacements_(device, prefix_ + "displacements", displacements),
-      occupancy_(device, occupancySpace(grid)),
-      tracedCells_(device.array<uint32_t>(grid.words())) {
-  CHECK(displacements.size() == size_t{3} * grid.cells());
+      occupancy_(device, occupancySpace(domain_)),
+      tracedCells_(device.array<uint32_t>(domain_.grids.size() * domain_.grids[0].words())) {
+  CHECK(displacements.size() == size_t{3} * domain_.grids[0].cells() * domain_.grids.size());
   updateTracedCells();
 }
 
@@ -43,9 +43,10 @@ std::string MeshLevel::tensorPrefix(uint32_t number) {
   return fmt::format("level{}.", number);
 }
 
-void MeshLevel::trace(const MeshRays& rays, uint32_t maximum, MeshHits& hits) {
+void MeshLevel::trace(const MeshRays& rays, uint32_t maximum, bool inOwn, MeshHits& hits) {
   CHECK(rays.count < hits.firstSample.size());
-  TraceOctahedra trace{grid_};
+  TraceOctahedra trace{inOwn ? domain_.ownGrids : domain_.grids};
+  trace.boxInFront = domain_.boxInFront;
   trace.rays = {rays.count};
   trace.sampleCapacity = static_cast<uint32_t>(hits.distances.size());
   trace.maximum = maximum;
@@ -68,12 +69,12 @@ void MeshLevel::trace(const MeshRays& rays, uint32_t maximum, MeshHits& hits) {
 }
 
 void MeshLevel::keepFaces(const std::vector<uint32_t>& bits) {
-  CHECK((bits.empty() || bits.size() == grid_.faceWords()));
+  CHECK((bits.empty() || bits.size() == faceWords(domain_.grids)));
   keptFaces_ = device_.uploadArray(bits);
 }
 
 void MeshLevel::backward(const MeshRays& rays, const MeshHits& hits, Slice<const float> positionGradients) {
-  OctahedraBackward back{grid_};
+  OctahedraBackward back{domain_.grids};
   back.samples = hits.samples();
   back.minCosine = settings_.minCosine;
   back.origins = rays.origins;
@@ -96,7 +97,7 @@ void MeshLevel::exclude(const std::vector<bool>& possible) {
 
 void MeshLevel::addOccupancy(const MeshRays& rays, const MeshHits& hits, Matrix<const float> logits) {
   OccupancySamples samples;
-  samples.resolution = grid_.resolution;
+  samples.resolution = domain_.latticeCells();
   samples.offset = settings_.opacityOffset;
   samples.rays = hits.finished(rays.count);
   samples.firstSample = hits.firstSample;
@@ -106,20 +107,24 @@ void MeshLevel::addOccupancy(const MeshRays& rays, const MeshHits& hits, Matrix<
   device_.run(samples);
 }
 
-void MeshLevel::refreshOccupancy() {
+void MeshLevel::refreshOccupancy(bool tracesNeighbours) {
   constexpr float kThreshold = 0.05f;
+  tracesNeighbours_ = tracesNeighbours;
   occupancy_.update(settings_.occupancyDecay, kThreshold);
   updateTracedCells();
 }
 
 void MeshLevel::updateTracedCells() {
-  device_.write(tracedCells_.all(), std::span<const uint32_t>(dilateCells(occupancy_.bitWords(), grid_.resolution)));
+  std::vector<uint32_t> cells = occupancy_.bitWords();
+  if (tracesNeighbours_) cells = dilateCells(cells, domain_.latticeCells());
+  device_.write(tracedCells_.all(), std::span<const uint32_t>(domain_.toGrids(cells)));
 }
 
 void MeshLevel::save(TensorSet& tensors, bool withMoments) {
   tensors.add(device_, displacements_, withMoments);
   tensors.add(prefix_ + "occupancy.values", occupancy_.values());
   tensors.add(prefix_ + "occupancy.bits", occupancy_.bitWords());
+  tensors.add(prefix_ + "occupancy.traces_neighbours", std::vector<uint32_t>{tracesNeighbours_});
 }
 
 void MeshLevel::restore(const fs::path& path, const Safetensors& file) {
@@ -131,6 +136,12 @@ void MeshLevel::restore(const fs::path& path, const Safetensors& file) {
                 "restore the config.toml that the checkpoint was trained with, or train again");
   }
   occupancy_.restore(values, bits);
+  const auto neighbours = file.require(path, prefix_ + "occupancy.traces_neighbours", TensorType::u32).as<uint32_t>();
+  if (neighbours.size() != 1) {
+    throw Error(path.string(), "tensor " + prefix_ + "occupancy.traces_neighbours", "is not one number",
+                "restore the file, or train again");
+  }
+  tracesNeighbours_ = neighbours[0] != 0;
   updateTracedCells();
 }
 

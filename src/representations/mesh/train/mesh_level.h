@@ -1,9 +1,10 @@
-// One level of detail of a mesh: a grid of octahedra in the region of interest, the places of its vertices, and which
-// of its cells are occupied. All levels share the networks and the hash grid of the model.
+// One level of detail of a part of a mesh: its grids of octahedra, the places of their vertices, and which cells are
+// occupied. All levels share the networks and the hash grid of the part.
 #pragma once
 
 #include "compute/octahedra.h"
 #include "field/parameters.h"
+#include "representations/mesh/train/mesh_part.h"
 #include "train/occupancy_grid.h"
 
 namespace tessera {
@@ -36,12 +37,13 @@ class MeshLevel {
     float opacityOffset = 0;   // added to logits
     float occupancyDecay = 1;  // per update
   };
-  // `number`: 0 is the finest. All cells are occupied. Keeps a reference to `device`.
-  MeshLevel(Device& device, uint32_t number, const OctahedraGrid& grid, const Settings& settings,
+  // `number`: 0 is the finest. displacements: [grids][cells][3]. All cells are occupied. Keeps a reference to `device`.
+  MeshLevel(Device& device, uint32_t number, OctahedraDomain domain, const Settings& settings,
             const std::vector<float>& displacements);
 
-  // Finds the hits of rays in occupied cells and their neighbours; each ray keeps its nearest `maximum`.
-  void trace(const MeshRays& rays, uint32_t maximum, MeshHits& hits);
+  // Finds the hits of rays in traced cells; each ray keeps its nearest `maximum`. `inOwn`: only within the domain's
+  // ownGrids.
+  void trace(const MeshRays& rays, uint32_t maximum, bool inOwn, MeshHits& hits);
   // From now on, rays hit only these faces (bits, TraceOctahedra::keptFaces); all faces if empty.
   void keepFaces(const std::vector<uint32_t>& bits);
   // Adds to the gradients of the vertices.
@@ -51,13 +53,14 @@ class MeshLevel {
   void exclude(const std::vector<bool>& possible);
   // Raises the occupancy to the opacities of the hits that rays reach.
   void addOccupancy(const MeshRays& rays, const MeshHits& hits, Matrix<const float> logits);
-  // Lets the occupancy decay: cells without recent hits that rays reach become empty.
-  void refreshOccupancy();
+  // Lets the occupancy decay: cells without recent hits that rays reach become empty. From now on, occupied cells are
+  // traced and, if requested, their neighbours, so that surfaces can grow.
+  void refreshOccupancy(bool tracesNeighbours);
 
-  const OctahedraGrid& grid() const { return grid_; }
-  ParameterGroup& displacements() { return displacements_; }  // [cells][3], in edges of a cell
-  OccupancyGrid& occupancy() { return occupancy_; }
-  // Occupied cells and their neighbours, bits.
+  const OctahedraDomain& domain() const { return domain_; }
+  ParameterGroup& displacements() { return displacements_; }  // [grids][cells][3], in edges of a cell
+  OccupancyGrid& occupancy() { return occupancy_; }           // of the lattice
+  // Bits, [grids][words()].
   std::vector<uint32_t> tracedCells() const { return device_.read(tracedCells_.all()); }
 
   // The state consists of the displacements (with moments for training) and the occupancy.
@@ -70,10 +73,11 @@ class MeshLevel {
 
   Device& device_;
   std::string prefix_;
-  OctahedraGrid grid_;
+  OctahedraDomain domain_;
   Settings settings_;
   ParameterGroup displacements_;
   OccupancyGrid occupancy_;
+  bool tracesNeighbours_ = true;
   Array<uint32_t> tracedCells_;
   Array<uint32_t> keptFaces_;  // without elements: all faces are
 };

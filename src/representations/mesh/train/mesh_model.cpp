@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "base/random.h"
-#include "train/run_folder.h"
 
 namespace tessera {
 namespace {
@@ -15,14 +14,27 @@ bool isSet(const std::vector<uint32_t>& bits, size_t i) {
   return (bits[i / 32] >> i % 32 & 1) != 0;
 }
 
+size_t countDisplacements(const OctahedraDomain& domain) {
+  return size_t{3} * domain.grids[0].cells() * domain.grids.size();
+}
+
 }  // namespace
 
-MeshModel::MeshModel(Device& device, const MeshConfig& config, const SceneFrame& frame)
+MeshModel::MeshModel(Device& device, const MeshConfig& config, const MeshPart& part)
     : device_(device),
       config_(config),
-      frame_(frame),
+      part_(part),
       field_(device, config.shape(), static_cast<uint64_t>(config.seed)) {
-  levels_.push_back(makeLevel(0, std::vector<float>(size_t{3} * config.grid(0).cells())));
+  constexpr float kGrey = 0.5f;
+  if (part.isBackground())
+    sky_ = ParameterGroup(device, "sky", std::vector<float>(size_t{3} * 6 * kSkyResolution * kSkyResolution, kGrey));
+  levels_.push_back(makeLevel(0, std::vector<float>(countDisplacements(domain(0)))));
+}
+
+std::vector<ParameterGroup*> MeshModel::sharedGroups() {
+  std::vector<ParameterGroup*> groups = {&field_.table(), &field_.encoder(), &field_.decoder()};
+  if (part_.isBackground()) groups.push_back(&sky_);
+  return groups;
 }
 
 std::unique_ptr<MeshLevel> MeshModel::makeLevel(uint32_t number, const std::vector<float>& displacements) {
@@ -31,19 +43,21 @@ std::unique_ptr<MeshLevel> MeshModel::makeLevel(uint32_t number, const std::vect
   settings.minCosine = static_cast<float>(config_.minCosine);
   settings.opacityOffset = opacityOffset();
   settings.occupancyDecay = static_cast<float>(config_.occupancyDecay);
-  return std::make_unique<MeshLevel>(device_, number, config_.grid(number), settings, displacements);
+  return std::make_unique<MeshLevel>(device_, number, domain(number), settings, displacements);
 }
 
 void MeshModel::addCoarseLevels(uint64_t seed) {
-  while (levels() < config_.levels()) levels_.push_back(mergeLevel(levels(), seed));
+  while (levels() < maxLevels()) levels_.push_back(mergeLevel(levels(), seed));
 }
 
 std::unique_ptr<MeshLevel> MeshModel::mergeLevel(uint32_t number, uint64_t seed) {
   MeshLevel& finer = level(number - 1);
-  const uint32_t n = finer.grid().resolution;
+  const OctahedraGrid& fine = finer.domain().grids.at(0);
+  CHECK(finer.domain().grids.size() == 1u);
+  const uint32_t n = fine.resolution;
   const std::vector<uint32_t> traced = finer.tracedCells();
   std::vector<uint32_t> cells;
-  for (uint32_t cell = 0; cell < finer.grid().cells(); ++cell)
+  for (uint32_t cell = 0; cell < fine.cells(); ++cell)
     if (isSet(traced, cell)) cells.push_back(cell);
   const uint32_t listed = static_cast<uint32_t>(cells.size());
 
@@ -67,9 +81,8 @@ std::unique_ptr<MeshLevel> MeshModel::mergeLevel(uint32_t number, uint64_t seed)
     field_.encode({count}, positions, Matrix<float>(logits.part(first, count), 1));
   }
 
-  const OctahedraGrid grid = config_.grid(number);
-  Array<float> opacities = device_.array<float>(finer.grid().cells()),
-               merged = device_.array<float>(size_t{3} * grid.cells());
+  const OctahedraGrid grid = domain(number).grids.at(0);
+  Array<float> opacities = device_.array<float>(fine.cells()), merged = device_.array<float>(size_t{3} * grid.cells());
   const Array<uint32_t> listedCells = device_.uploadArray(cells);
   MergeOctahedra merge;
   merge.resolution = n;
@@ -86,7 +99,7 @@ std::unique_ptr<MeshLevel> MeshModel::mergeLevel(uint32_t number, uint64_t seed)
   // A cell may hold a surface if one of its children may.
   const std::vector<float> occupancy = finer.occupancy().values();
   std::vector<bool> possible(grid.cells());
-  for (uint32_t cell = 0; cell < finer.grid().cells(); ++cell) {
+  for (uint32_t cell = 0; cell < fine.cells(); ++cell) {
     if (occupancy[cell] < 0) continue;  // excluded
     const uint32_t half = n / 2, place[3] = {cell % n / 2, cell / n % n / 2, cell / (n * n) / 2};
     possible[place[0] + half * (place[1] + half * place[2])] = true;
@@ -96,40 +109,25 @@ std::unique_ptr<MeshLevel> MeshModel::mergeLevel(uint32_t number, uint64_t seed)
 }
 
 bool MeshModel::allFinite() {
-  bool finite =
-      field_.table().allFinite(device_) && field_.encoder().allFinite(device_) && field_.decoder().allFinite(device_);
+  bool finite = true;
+  for (ParameterGroup* group : sharedGroups()) finite = finite && group->allFinite(device_);
   for (const auto& level : levels_) finite = finite && level->displacements().allFinite(device_);
   return finite;
 }
 
 void MeshModel::save(TensorSet& tensors, bool withMoments) {
-  for (const ParameterGroup* group : {&field_.table(), &field_.encoder(), &field_.decoder()}) {
-    tensors.add(device_, *group, withMoments);
-  }
+  for (const ParameterGroup* group : sharedGroups()) tensors.add(device_, *group, withMoments);
   for (const auto& level : levels_) level->save(tensors, withMoments);
 }
 
 void MeshModel::restore(const fs::path& path, const Safetensors& file) {
-  for (ParameterGroup* group : {&field_.table(), &field_.encoder(), &field_.decoder()}) {
-    loadGroup(device_, path, file, *group);
-  }
+  for (ParameterGroup* group : sharedGroups()) loadGroup(device_, path, file, *group);
   levels_.resize(1);
   levels_[0]->restore(path, file);
-  while (levels() < config_.levels() && file.tensors.contains(MeshLevel::tensorPrefix(levels()) + "displacements")) {
-    levels_.push_back(makeLevel(levels(), std::vector<float>(size_t{3} * config_.grid(levels()).cells())));
+  while (levels() < maxLevels() && file.tensors.contains(MeshLevel::tensorPrefix(levels()) + "displacements")) {
+    levels_.push_back(makeLevel(levels(), std::vector<float>(countDisplacements(domain(levels())))));
     levels_.back()->restore(path, file);
   }
-}
-
-std::unique_ptr<MeshModel> loadMeshModel(Device& device, const fs::path& folder) {
-  const ModelFolder model(folder);
-  const ModelManifest manifest = requireManifest(model, "mesh");
-  MeshConfig config;
-  configFromToml(config.fields(), model.configPath());
-  auto loaded = std::make_unique<MeshModel>(device, config, model.readPlacement().frame);
-  const fs::path file = folder / manifest.files.at(0);
-  loaded->restore(file, readSafetensors(file));
-  return loaded;
 }
 
 }  // namespace tessera

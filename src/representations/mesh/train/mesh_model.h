@@ -1,5 +1,5 @@
-// A mesh of one block: levels of detail of octahedra in the region of interest of a capture, and the field that gives
-// all of them their opacities and colours.
+// A part of a mesh: levels of detail of octahedra, the field that gives all of them their opacities and colours, and
+// for the outside, the sky.
 #pragma once
 
 #include <memory>
@@ -7,25 +7,30 @@
 #include "representations/mesh/train/config.h"
 #include "representations/mesh/train/mesh_field.h"
 #include "representations/mesh/train/mesh_level.h"
-#include "train/scene_frame.h"
+#include "representations/mesh/train/mesh_part.h"
 
 namespace tessera {
 
 class MeshModel {
  public:
   // Has the finest level. Keeps a reference to `device`.
-  MeshModel(Device& device, const MeshConfig& config, const SceneFrame& frame);
+  MeshModel(Device& device, const MeshConfig& config, const MeshPart& part);
 
   uint32_t levels() const { return static_cast<uint32_t>(levels_.size()); }
   MeshLevel& level(uint32_t number) { return *levels_[number]; }
-  // Adds the coarser levels, each from the next finer one (MergeOctahedra); `seed`: of the points at which opacities
-  // are compared.
+  // Adds the coarser levels of a block, each from the next finer one (MergeOctahedra); `seed`: of the points at which
+  // opacities are compared.
   void addCoarseLevels(uint64_t seed);
 
   Device& device() { return device_; }
   MeshField& field() { return field_; }
   const MeshConfig& config() const { return config_; }
-  const SceneFrame& frame() const { return frame_; }
+  const MeshPart& part() const { return part_; }
+  const SceneFrame& frame() const { return part_.frame; }
+  uint32_t maxLevels() const { return part_.isBackground() ? 1 : config_.levels(); }
+  // The cube map of the sky behind the outside, CubeMapForward::texels.
+  static constexpr uint32_t kSkyResolution = 64;
+  ParameterGroup& sky() { return sky_; }
   float opacityOffset() const { return static_cast<float>(config_.opacityOffset); }
 
   // The state consists of the parameters (with moments for training) and of the levels that there are.
@@ -36,15 +41,15 @@ class MeshModel {
  private:
   std::unique_ptr<MeshLevel> makeLevel(uint32_t number, const std::vector<float>& displacements);
   std::unique_ptr<MeshLevel> mergeLevel(uint32_t number, uint64_t seed);
+  OctahedraDomain domain(uint32_t level) const { return config_.domain(part_, level); }
+  std::vector<ParameterGroup*> sharedGroups();
 
   Device& device_;
   MeshConfig config_;
-  SceneFrame frame_;
+  MeshPart part_;
   MeshField field_;
+  ParameterGroup sky_;  // empty for a block
   std::vector<std::unique_ptr<MeshLevel>> levels_;
 };
-
-// Loads a trained model from its folder for rendering. Throws Error if its files are missing or malformed.
-std::unique_ptr<MeshModel> loadMeshModel(Device& device, const fs::path& folder);
 
 }  // namespace tessera

@@ -1,8 +1,10 @@
 #include "representations/mesh/train/mesh_renderer.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "compute/composite.h"
+#include "compute/cube_map.h"
 
 namespace tessera {
 namespace {
@@ -12,9 +14,20 @@ constexpr uint32_t kSamples = 1 << 16;  // rays whose hits do not fit are render
 constexpr uint32_t kMaxHits = 1 << 12;  // of a ray
 constexpr float kMinTransmittance = 1e-3f;
 
+// Adds what is behind `view`.
+void addBehind(RenderedView& view, const RenderedView& behind) {
+  for (size_t pixel = 0; pixel < view.opacity.pixels.size(); ++pixel) {
+    const float transmittance = 1 - view.opacity.pixels[pixel];
+    for (size_t c = 0; c < 3; ++c)
+      view.colour.pixels[3 * pixel + c] += transmittance * behind.colour.pixels[3 * pixel + c];
+    view.depth.pixels[pixel] += transmittance * behind.depth.pixels[pixel];
+    view.opacity.pixels[pixel] += transmittance * behind.opacity.pixels[pixel];
+  }
+}
+
 }  // namespace
 
-MeshRenderer::MeshRenderer(MeshModel& model, uint32_t level)
+MeshPartRenderer::MeshPartRenderer(MeshModel& model, uint32_t level)
     : model_(model),
       level_(level),
       imageRays_(model.device(), kRays),
@@ -23,13 +36,14 @@ MeshRenderer::MeshRenderer(MeshModel& model, uint32_t level)
   Device& device = model.device();
   hits_.counters = counters_;
   model.field().reserve(kSamples);
-  colour_ = device.array<float>(kRays * 3);
+  for (Array<float>* perRay : {&colour_, &sky_}) *perRay = device.array<float>(kRays * 3);
   for (Array<float>* perRay : {&opacity_, &depth_}) *perRay = device.array<float>(kRays);
   weights_ = device.array<float>(kSamples);
 }
 
-std::vector<uint32_t> MeshRenderer::renderPiece(const ImageRays::Piece& piece) {
-  model_.level(level_).trace({piece.rays, piece.origins, piece.directions, piece.far}, kMaxHits, hits_);
+std::vector<uint32_t> MeshPartRenderer::renderPiece(const ImageRays::Piece& piece) {
+  Device& device = model_.device();
+  model_.level(level_).trace({piece.rays, piece.origins, piece.directions, piece.far}, kMaxHits, true, hits_);
   const MeshField::Output output =
       model_.field().forward(hits_.samples(), hits_.positions, piece.directions, hits_.rayOfSample, false);
   CompositeForward composite;
@@ -45,11 +59,14 @@ std::vector<uint32_t> MeshRenderer::renderPiece(const ImageRays::Piece& piece) {
   composite.opacity = opacity_;
   composite.depth = depth_;
   composite.weights = weights_;
-  model_.device().run(composite);
-  return model_.device().read(counters_.all());
+  device.run(composite);
+  if (model_.part().isBackground()) {
+    device.run(CubeMapForward{MeshModel::kSkyResolution, {piece.rays}, piece.directions, model_.sky().values, sky_});
+  }
+  return device.read(counters_.all());
 }
 
-RenderedView MeshRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
+RenderedView MeshPartRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   Device& device = model_.device();
   imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
                    opaqueDepth);
@@ -64,14 +81,41 @@ RenderedView MeshRenderer::render(const Camera& camera, const Pose& worldFromCam
     const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
     const std::vector<float> opacity = device.read(opacity_.part(0, finished));
     const std::vector<float> depth = device.read(depth_.part(0, finished));
-    std::copy(colour.begin(), colour.end(), view.colour.pixels.begin() + static_cast<ptrdiff_t>(first * 3));
-    std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
-    for (uint32_t ray = 0; ray < finished; ++ray)
-      view.depth.pixels[first + ray] = imageRays_.toViewDepth(ray, depth[ray]);
+    const std::vector<float> sky = device.read(sky_.part(0, size_t{finished} * 3));
+    for (uint32_t ray = 0; ray < finished; ++ray) {
+      const size_t pixel = first + ray;
+      // The sky makes the pixel opaque, unless an opaque object is known to stand at the ray's end.
+      const bool hasSky =
+          model_.part().isBackground() && (opaqueDepth == nullptr || !std::isfinite(opaqueDepth->pixels[pixel]));
+      const float skyShare = hasSky ? 1 - opacity[ray] : 0;
+      for (size_t c = 0; c < 3; ++c)
+        view.colour.pixels[3 * pixel + c] = colour[3 * ray + c] + skyShare * sky[3 * ray + c];
+      view.opacity.pixels[pixel] = hasSky ? 1 : opacity[ray];
+      const float seenDepth = hasSky ? depth[ray] / std::max(opacity[ray], 1e-6f) : depth[ray];
+      view.depth.pixels[pixel] = imageRays_.toViewDepth(ray, seenDepth);
+    }
     first += finished;
     const double fitting = 0.9 * kSamples / std::max(1.0, counters[0] / (1.0 * finished));
     nextRays = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
   }
+  return view;
+}
+
+MeshRenderer::MeshRenderer(TrainedMesh& mesh) : mesh_(mesh) {
+  for (const auto& part : mesh.parts) parts_.push_back(std::make_unique<MeshPartRenderer>(*part));
+}
+
+RenderedView MeshRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
+  RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
+                    ImageF(camera.width, camera.height, 1)};
+  const auto add = [&](int block) {
+    for (size_t i = 0; i < parts_.size(); ++i)
+      if (mesh_.parts[i]->part().block == block)
+        addBehind(view, parts_[i]->render(camera, worldFromCamera, opaqueDepth));
+  };
+  const Vec3d eye = mesh_.grid.inGrid(worldFromCamera.translation);
+  for (const int block : mesh_.grid.frontToBack({eye.x(), eye.y()})) add(block);
+  add(-1);
   return view;
 }
 

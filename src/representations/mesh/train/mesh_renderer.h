@@ -1,16 +1,18 @@
-// Renders a trained mesh model by tracing rays through its octahedra and compositing all hits, as in training.
+// Renders a trained mesh by tracing rays through the octahedra of its parts and compositing all hits, as in training.
 #pragma once
 
 #include "representations/mesh/train/mesh_model.h"
+#include "representations/mesh/train/trained_mesh.h"
 #include "scene/view_renderer.h"
 #include "train/image_rays.h"
 
 namespace tessera {
 
-class MeshRenderer final : public ViewRenderer {
+// Renders one level of detail of a part: of a block, what lies within its walls; outside, the sky, too.
+class MeshPartRenderer final : public ViewRenderer {
  public:
-  // Renders one level of detail. Keeps a reference to `model`.
-  explicit MeshRenderer(MeshModel& model, uint32_t level = 0);
+  // Keeps a reference to `model`.
+  explicit MeshPartRenderer(MeshModel& model, uint32_t level = 0);
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override { return model_.device().name(); }
@@ -24,7 +26,21 @@ class MeshRenderer final : public ViewRenderer {
   ImageRays imageRays_;
   MeshHits hits_;
   Array<uint32_t> counters_;
-  Array<float> colour_, opacity_, depth_, weights_;
+  Array<float> colour_, opacity_, depth_, weights_, sky_;
+};
+
+// Renders the blocks, front to back, and what lies outside behind them.
+class MeshRenderer final : public ViewRenderer {
+ public:
+  // Keeps a reference to `mesh`.
+  explicit MeshRenderer(TrainedMesh& mesh);
+
+  RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
+  std::string device() const override { return mesh_.device->name(); }
+
+ private:
+  TrainedMesh& mesh_;
+  std::vector<std::unique_ptr<MeshPartRenderer>> parts_;  // of mesh_.parts
 };
 
 }  // namespace tessera

@@ -1,95 +1,125 @@
 #include "representations/mesh/train/mesh_start.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 
-#include "base/error.h"
 #include "representations/field/train/field_renderer.h"
+#include "scene/contraction.h"
 
 namespace tessera {
 namespace {
 
 constexpr int kPhotoStride = 3;  // pixels, of the rays that find surfaces
 constexpr int kTileEdge = 8;     // pixels
+constexpr double kNever = std::numeric_limits<double>::infinity();
 
-// Returns the cells of the mesh that overlap with cells of the coarse field in which photos see something, or with
-// their neighbours.
-std::vector<bool> cellsWithSurfaces(const std::vector<uint32_t>& seen, const MarchSpace& space,
-                                    const OctahedraGrid& grid) {
-  const uint32_t n = grid.resolution, fieldCells = static_cast<uint32_t>(space.gridResolution);
-  // The first and the last cell of the field beside each cell of the mesh, along any axis.
-  std::vector<std::array<uint32_t, 2>> ranges(n);
-  for (uint32_t i = 0; i < n; ++i) {
-    const auto place = [&](double edge) {
-      const double u = edge / n;  // 0 to 1 across the region of interest, which is half of a contracted space
-      return (space.contracted ? (2 * u + 1) / 4 : u) * fieldCells;
-    };
-    const double low = std::floor(place(i) + 1e-6), high = std::ceil(place(i + 1.0) - 1e-6) - 1;
-    ranges[i] = {static_cast<uint32_t>(low), std::min(static_cast<uint32_t>(high), fieldCells - 1)};
-  }
-  std::vector<bool> cells(grid.cells());
-  for (uint32_t cell = 0; cell < grid.cells(); ++cell) {
-    const auto &x = ranges[cell % n], &y = ranges[cell / n % n], &z = ranges[cell / (n * n)];
-    bool any = false;
-    for (uint32_t k = z[0]; k <= z[1]; ++k)
-      for (uint32_t j = y[0]; j <= y[1]; ++j)
-        for (uint32_t i = x[0]; i <= x[1]; ++i) {
-          const uint32_t at = i + fieldCells * (j + fieldCells * k);
-          any = any || (seen[at / 32] >> at % 32 & 1) != 0;
-        }
-    cells[cell] = any;
-  }
-  return cells;
-}
-
-// Returns the tiles of a photo whose middles see a surface in the region of interest.
-TileShares tilesOfPhoto(const Capture& capture, int photo, const SceneFrame& frame, FieldRenderer& renderer) {
-  const Pose& pose = capture.photos[photo].worldFromCamera;
-  const Camera& camera = capture.cameras[capture.photos[photo].camera];
-  const int columns = std::max(1, camera.width / kTileEdge), rows = std::max(1, camera.height / kTileEdge);
-  const Camera coarse = camera.scaledTo(columns, rows);
-  const RenderedView view = renderer.render(coarse, pose, nullptr);
-  TileShares shares;
-  double total = 0;
-  for (int y = 0; y < rows; ++y) {
-    for (int x = 0; x < columns; ++x) {
-      const float opacity = *view.opacity.at(x, y);
-      const auto inCamera = coarse.directionInCamera({x + 0.5, y + 0.5});
-      if (opacity < 0.5f || !inCamera || inCamera->z() <= 0) continue;
-      const double depth = *view.depth.at(x, y) / opacity;
-      const Vec3d world = pose.rotation * (*inCamera * (depth / inCamera->z())) + pose.translation;
-      if (frame.sceneFromWorld(world).cwiseAbs().maxCoeff() > 1) continue;
-      const PhotoTile tile{photo, static_cast<uint32_t>(camera.width * x / columns),
-                           static_cast<uint32_t>(camera.height * y / rows),
-                           static_cast<uint32_t>(camera.width * (x + 1) / columns),
-                           static_cast<uint32_t>(camera.height * (y + 1) / rows)};
-      total += (tile.right - tile.left) * (tile.bottom - tile.top);
-      shares.tiles.push_back(tile);
-      shares.until.push_back(total);
+// Returns the distances at which a ray is in a box around the origin; an empty interval if it misses it.
+std::array<double, 2> rangeInBox(const Vec3d& origin, const Vec3d& direction, const std::array<float, 3>& halfEdges) {
+  std::array<double, 2> range = {0, kNever};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double half = halfEdges[axis];
+    if (direction[axis] == 0) {
+      if (std::abs(origin[axis]) > half) return {kNever, 0};
+      continue;
     }
+    const double side = std::copysign(half, direction[axis]);
+    range[0] = std::max(range[0], (-side - origin[axis]) / direction[axis]);
+    range[1] = std::min(range[1], (side - origin[axis]) / direction[axis]);
   }
-  return shares;
+  return range;
 }
 
 }  // namespace
 
-MeshStart findMeshStart(const Capture& capture, FieldModel& coarse, const MeshConfig& config) {
+bool MeshStart::isEmpty() const {
+  return pixels() == 0 || std::find(cells.begin(), cells.end(), true) == cells.end();
+}
+
+double MeshStart::pixels() const {
+  double sum = 0;
+  for (const TileShares& photo : tiles) sum += photo.total();
+  return sum;
+}
+
+SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse)
+    : frame_(coarse.frame()), space_(coarse.space()), photoCount_(capture.photos.size()) {
   FieldRenderer renderer(coarse);
-  MeshStart start;
-  start.tiles.resize(capture.photos.size());
-  bool any = false;
   for (const int photo : capture.photosIn(Split::train)) {
-    start.tiles[photo] = tilesOfPhoto(capture, photo, coarse.frame(), renderer);
-    any = any || !start.tiles[photo].tiles.empty();
+    const Pose& pose = capture.photos[photo].worldFromCamera;
+    const Camera& camera = capture.cameras[capture.photos[photo].camera];
+    const int columns = std::max(1, camera.width / kTileEdge), rows = std::max(1, camera.height / kTileEdge);
+    const Camera small = camera.scaledTo(columns, rows);
+    const RenderedView view = renderer.render(small, pose, nullptr);
+    for (int y = 0; y < rows; ++y) {
+      for (int x = 0; x < columns; ++x) {
+        const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
+        if (!inCamera) continue;
+        Sight sight;
+        sight.tile = {photo, static_cast<uint32_t>(camera.width * x / columns),
+                      static_cast<uint32_t>(camera.height * y / rows),
+                      static_cast<uint32_t>(camera.width * (x + 1) / columns),
+                      static_cast<uint32_t>(camera.height * (y + 1) / rows)};
+        sight.eye = pose.translation;
+        sight.towards = (pose.rotation * *inCamera).normalized();
+        const double opacity = *view.opacity.at(x, y), cosine = inCamera->normalized().z();
+        sight.isSurface = opacity >= 0.5 && cosine > 0;
+        if (sight.isSurface) sight.distance = *view.depth.at(x, y) / opacity / cosine;
+        sights_.push_back(sight);
+      }
+    }
   }
   CullOptions options;
   options.stride = kPhotoStride;
   renderer.cullUnseen(capture, options);
-  start.cells = cellsWithSurfaces(coarse.device().read(renderer.cells()), coarse.space(), config.grid(0));
-  if (!any || std::find(start.cells.begin(), start.cells.end(), true) == start.cells.end()) {
-    throw Error(capture.root.string(), "transforms.json", "no training photo shows a surface in the region of interest",
-                "check the camera poses and the masks, or enlarge the region with --set roi_margin=...");
+  cells_ = coarse.device().read(renderer.cells());
+}
+
+MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& domain) const {
+  MeshStart start;
+  start.cells.assign(size_t{domain.latticeCells()} * domain.latticeCells() * domain.latticeCells(), false);
+  // Cells of the coarse field are sampled at points that are closer together than cells of the mesh.
+  const int n = space_.gridResolution;
+  const double coarseCell = (space_.contracted ? 4.0 : 2.0) / n / frame_.scale;
+  const double meshCell = 2.0 / domain.latticeCells() / part.frame.scale;
+  const int points = std::clamp(static_cast<int>(std::ceil(2 * coarseCell / meshCell)), 4, 16);
+  for (int cell = 0; cell < n * n * n; ++cell) {
+    if ((cells_[static_cast<size_t>(cell / 32)] >> cell % 32 & 1) == 0) continue;
+    const int place[3] = {cell % n, cell / n % n, cell / (n * n)};
+    for (int point = 0; point < points * points * points; ++point) {
+      const int within[3] = {point % points, point / points % points, point / (points * points)};
+      Triple<double> x;
+      for (int axis = 0; axis < 3; ++axis) {
+        const double u = (place[axis] + (within[axis] + 0.5) / points) / n;
+        x[axis] = space_.contracted ? 4 * u - 2 : 2 * u - 1;
+      }
+      if (space_.contracted) x = uncontract(x);
+      const Vec3d world = frame_.worldFromScene({x[0], x[1], x[2]});
+      if (const auto at = domain.latticeCell(part.frame.sceneFromWorld(world))) start.cells[*at] = true;
+    }
+  }
+
+  // An occupancy has at least one cell; this one is for what shows the sky alone.
+  if (part.isBackground() && std::find(start.cells.begin(), start.cells.end(), true) == start.cells.end())
+    start.cells.front() = true;
+
+  start.tiles.resize(photoCount_);
+  constexpr float kReach = static_cast<float>(1 + kBlockMargin / (1 - 2 * kBlockMargin));  // half of the margin
+  for (const Sight& sight : sights_) {
+    const Vec3d eye = part.frame.sceneFromWorld(sight.eye), towards = part.frame.rotation * sight.towards;
+    const double distance = sight.isSurface ? sight.distance * part.frame.scale : kNever;
+    if (part.isBackground()) {
+      const auto [enter, leave] = rangeInBox(eye, towards, part.halfEdges);
+      if (enter < leave && distance <= leave) continue;
+    } else {
+      if (!sight.isSurface) continue;
+      if ((eye + distance * towards).cwiseAbs().maxCoeff() > kReach) continue;
+    }
+    TileShares& shares = start.tiles[static_cast<size_t>(sight.tile.photo)];
+    const double pixels = static_cast<double>(sight.tile.right - sight.tile.left) *
+                          static_cast<double>(sight.tile.bottom - sight.tile.top);
+    shares.until.push_back(shares.total() + pixels);
+    shares.tiles.push_back(sight.tile);
   }
   return start;
 }

@@ -1,19 +1,47 @@
-// Where the training of a mesh starts: a coarse field of the whole capture says which cells may hold a surface, and
-// which pixels of the photos show one that lies in the region of interest.
+// Where the training of a mesh starts: a coarse field of the whole capture says which cells of each part may hold a
+// surface, and which pixels of the photos show one.
 #pragma once
 
 #include "representations/field/train/field_model.h"
-#include "representations/mesh/train/config.h"
+#include "representations/mesh/train/mesh_part.h"
 #include "train/photo_tiles.h"
 
 namespace tessera {
 
+// Where the training of one part starts.
 struct MeshStart {
-  std::vector<bool> cells;        // [cells of the grid]
+  std::vector<bool> cells;        // [cells of the lattice] of the finest level
   std::vector<TileShares> tiles;  // [photo]; only training photos have some
+
+  // Nothing can be trained without both.
+  bool isEmpty() const;
+  double pixels() const;  // of the tiles
 };
 
-// Throws Error if no training photo shows a surface in the region. `coarse` has the frame of the mesh.
-MeshStart findMeshStart(const Capture& capture, FieldModel& coarse, const MeshConfig& config);
+// What the training photos see of the coarse field, in the world.
+class SurfaceSurvey {
+ public:
+  SurfaceSurvey(const Capture& capture, FieldModel& coarse);
+
+  // Finds the cells of `domain`, of the part's finest level, in which there may be a surface, and the tiles whose
+  // middles show one in the block or up to half of its margin beside it; outside: the tiles that show the sky, or a
+  // surface that is not in front of the region.
+  MeshStart findStart(const MeshPart& part, const OctahedraDomain& domain) const;
+
+ private:
+  // A tile of a photo, and what its middle shows.
+  struct Sight {
+    PhotoTile tile;
+    Vec3d eye, towards;     // the camera's centre and the direction of the middle, unit
+    double distance = 0;    // of the surface, in world units
+    bool isSurface = true;  // else the sky
+  };
+
+  SceneFrame frame_;  // of the coarse field
+  MarchSpace space_;
+  std::vector<uint32_t> cells_;  // of the coarse field, in which photos see something; bits
+  std::vector<Sight> sights_;    // by photo
+  size_t photoCount_;
+};
 
 }  // namespace tessera

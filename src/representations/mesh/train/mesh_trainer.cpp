@@ -5,6 +5,7 @@
 
 #include "base/random.h"
 #include "compute/composite.h"
+#include "compute/cube_map.h"
 #include "representations/mesh/train/mesh_schedule.h"
 
 namespace tessera {
@@ -12,8 +13,11 @@ namespace {
 
 constexpr uint32_t kCapacityPerDemand = 2;                // for steps that need more than the last one
 constexpr uint32_t kMaxTrainingHits = 256;                // of a ray
-constexpr uint32_t kLosses = 2 * PhotoLoss::kLosses + 1;  // of a level: of both images, and distortion
+constexpr uint32_t kLosses = 2 * PhotoLoss::kLosses + 2;  // of a level: of both images, distortion, depth
 constexpr uint32_t kRaysPerCoarseRay = 4;
+// Of these updates of the occupancy, one is followed by hits in the neighbours of occupied cells, too. They are most
+// hits, and nearly all of them are transparent.
+constexpr int64_t kUpdatesPerExploration = 8;
 constexpr float kMinTrainingTransmittance = 1e-4f;
 constexpr double kFinalVertexFactor = 0.01;
 // With `--minutes`, the number of steps is known only after a quarter of the time: until then the rate must not depend
@@ -23,18 +27,18 @@ constexpr double kConstantVertexFraction = 0.3;
 PhotoRays::Settings raySettings(const MeshConfig& config) {
   PhotoRays::Settings settings = config.photoRaySettings();
   settings.randomBackground = config.randomBackground;
-  settings.sparseDepthRayFraction = 0;
+  if (config.depthWeight <= 0) settings.sparseDepthRayFraction = 0;
   return settings;
 }
 
 }  // namespace
 
-MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfig& config, const SceneFrame& frame,
+MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfig& config, const MeshPart& part,
                          MeshStart start)
     : device_(device),
       config_(config),
-      model_(device, config, frame),
-      photoRays_(device, capture, frame, raySettings(config)),
+      model_(device, config, part),
+      photoRays_(device, capture, part.frame, raySettings(config)),
       photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config) {
   model_.level(0).exclude(start.cells);
@@ -47,7 +51,7 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
   counters_ = device.array<uint32_t>(levels * MeshHits::kCounters);
   model_.field().reserve(samples);
   for (Array<float>* perRay : {&opacity_, &opaqueOpacity_}) *perRay = device.array<float>(rays);
-  for (Array<float>* perRay : {&colour_, &opaqueColour_}) *perRay = device.array<float>(size_t{rays} * 3);
+  for (Array<float>* perRay : {&colour_, &opaqueColour_, &skyColour_}) *perRay = device.array<float>(size_t{rays} * 3);
   losses_ = device.array<float>(levels * kLosses);
   for (Array<float>* perSample : {&sampleWeights_, &sampleSteps_, &weightGradients_, &logitGradients_})
     *perSample = device.array<float>(samples);
@@ -57,9 +61,10 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
 
 void MeshTrainer::refreshOccupancy(int64_t step) {
   if (step % config_.occupancyEvery != 0 || step < config_.occupancyStartSteps) return;
+  const bool explores = step / config_.occupancyEvery % kUpdatesPerExploration == 0;
   for (uint32_t level = 0; level < model_.levels(); ++level) {
     // Without hits of recent steps all cells would become empty, and none would be hit again.
-    if (level == 0 || movesVertices(step)) model_.level(level).refreshOccupancy();
+    if (level == 0 || movesVertices(step)) model_.level(level).refreshOccupancy(explores);
   }
 }
 
@@ -74,11 +79,11 @@ StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
 
   // The step is over, so its counters may be read.
   const auto [counters, losses] = device_.readAll(counters_.all(), losses_.all());
-  photoLoss_.exposures().settle(step, config_.exposure);
   StepReport report;
   report.samples = report.marched = std::min<uint32_t>(counters[0], static_cast<uint32_t>(hits_.distances.size()));
   report.rays = counters[1];
-  report.loss = losses[0] + losses[PhotoLoss::kLosses] + losses[2 * PhotoLoss::kLosses];
+  constexpr uint32_t kColours = PhotoLoss::kLosses;
+  report.loss = losses[0] + losses[kColours] + losses[2 * kColours] + losses[2 * kColours + 1];
   double weight = 0;
   for (uint32_t ray = 0; ray < report.rays; ++ray) weight += photoRays_.batch().weights[ray];
   report.squaredError = losses[1] / std::max(1.0, 3 * weight);
@@ -97,7 +102,7 @@ void MeshTrainer::addGradients(uint32_t number, int64_t step, int64_t plannedSte
   MeshLevel& level = model_.level(number);
   hits_.counters = counters_.part(size_t{number} * MeshHits::kCounters, MeshHits::kCounters);
   const MeshRays traced{rays, photoRays_.origins(0, rays), directions, {}};
-  level.trace(traced, kMaxTrainingHits, hits_);
+  level.trace(traced, kMaxTrainingHits, false, hits_);
   const Count samples = hits_.samples();
   const MeshField::Output output =
       model_.field().forward(samples, hits_.positions, directions, hits_.rayOfSample, true);
@@ -106,7 +111,8 @@ void MeshTrainer::addGradients(uint32_t number, int64_t step, int64_t plannedSte
   // Losses are means over the rays of the step, of which this level may use a part.
   const Batch batch{rays, isFinest, static_cast<double>(photoRays_.count()) / rays, output,
                     losses_.part(size_t{number} * kLosses, kLosses)};
-  const double firstWeight = config_.opaqueLoss ? MeshSchedule::firstWeight(step, plannedSteps) : 1;
+  const bool hasSecond = config_.opaqueLoss && !model_.part().isBackground();
+  const double firstWeight = hasSecond ? MeshSchedule::firstWeight(step, plannedSteps) : 1;
   addVolumeLoss(batch, firstWeight);
   addOpaqueLoss(batch, 1 - firstWeight, MeshSchedule::threshold(step, plannedSteps));
   model_.field().backward(samples, hits_.positions, logitGradients_, Matrix<const float>(sampleColourGradients_, 3),
@@ -127,13 +133,24 @@ void MeshTrainer::addVolumeLoss(const Batch& batch, double weight) {
   composite.colour = colour_;
   composite.opacity = opacity_;
   composite.weights = sampleWeights_;
+  const bool hasSky = model_.part().isBackground();
+  const Slice<const float> directions = photoRays_.directions(0, batch.rays);
+  if (hasSky) {
+    device_.run(CubeMapForward{MeshModel::kSkyResolution, finished, directions, model_.sky().values, skyColour_});
+    composite.background = skyColour_;
+  }
   device_.run(composite);
   PhotoLoss::Picture picture{finished, 0, batch.rays, colour_.part(0, size_t{3} * batch.rays),
                              opacity_.part(0, batch.rays)};
+  picture.standsBeforeBackgrounds = !hasSky;
   picture.weight = static_cast<float>(batch.mean * weight);
-  picture.trainsExposures = batch.isFinest;
+  picture.trainsExposures = false;
   photoLoss_.compare(photoRays_, picture, batch.losses.part(0, PhotoLoss::kLosses));
   photoLoss_.passBack(photoRays_, picture);
+  if (hasSky) {
+    device_.run(CubeMapBackward{MeshModel::kSkyResolution, finished, directions, opacity_,
+                                photoLoss_.colourGradients(picture), model_.sky().gradients});
+  }
 
   CompositeBackward back;
   back.extinction = composite.extinction;
@@ -143,6 +160,7 @@ void MeshTrainer::addVolumeLoss(const Batch& batch, double weight) {
   back.firstSample = hits_.firstSample;
   back.x = batch.output.logits;
   back.colours = batch.output.colours;
+  back.background = composite.background;
   back.rayColourGradients = photoLoss_.colourGradients(picture);
   back.rayOpacityGradients = photoLoss_.opacityGradients(picture);
   if (config_.distortionWeight > 0) {
@@ -156,6 +174,21 @@ void MeshTrainer::addVolumeLoss(const Batch& batch, double weight) {
     distortion.loss = batch.losses.part(2 * PhotoLoss::kLosses, 1);
     distortion.weightGradients = weightGradients_;
     device_.run(distortion);
+    back.weightGradients = weightGradients_;
+  }
+  if (config_.depthWeight > 0 && config_.sparseDepthRayFraction > 0) {
+    if (config_.distortionWeight <= 0) device_.fillZero(weightGradients_.all());
+    DepthLoss depth;
+    depth.scale = static_cast<float>(config_.depthWeight) / static_cast<float>(batch.rays);
+    depth.tolerance = static_cast<float>(config_.depthTolerance);
+    depth.rays = finished;
+    depth.firstSample = hits_.firstSample;
+    depth.weights = sampleWeights_;
+    depth.distances = hits_.distances;
+    depth.known = photoRays_.distances(0, batch.rays);
+    depth.loss = batch.losses.part(2 * PhotoLoss::kLosses + 1, 1);
+    depth.weightGradients = weightGradients_;
+    device_.run(depth);
     back.weightGradients = weightGradients_;
   }
   back.xGradients = logitGradients_;
@@ -184,7 +217,7 @@ void MeshTrainer::addOpaqueLoss(const Batch& batch, double weight, double thresh
                              opaqueOpacity_.part(0, batch.rays)};
   picture.standsBeforeBackgrounds = false;
   picture.weight = static_cast<float>(batch.mean * weight);
-  picture.trainsExposures = batch.isFinest;
+  picture.trainsExposures = false;
   photoLoss_.compare(photoRays_, picture, losses);
   photoLoss_.passBack(photoRays_, picture);
 
@@ -211,6 +244,11 @@ void MeshTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
   adam.l2 = static_cast<float>(config_.networkL2);
   model_.field().encoder().step(device_, adam);
   model_.field().decoder().step(device_, adam);
+  if (model_.part().isBackground()) {
+    adam.l2 = 0;
+    adam.skipZeroGradients = true;
+    model_.sky().step(device_, adam);
+  }
   if (movesVertices(step)) {
     RateSchedule schedule;
     schedule.rate = config_.vertexLearningRate;
@@ -223,29 +261,23 @@ void MeshTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
     for (uint32_t level = 0; level < model_.levels(); ++level)
       model_.level(level).displacements().step(device_, vertices);
   }
-  Adam exposureAdam;
-  exposureAdam.rate = static_cast<float>(config_.exposureLearningRate * adam.rate / config_.learningRate);
-  exposureAdam.skipZeroGradients = true;
-  photoLoss_.exposures().step(exposureAdam, config_.exposure);
 }
 
 Bytes MeshTrainer::save(uint32_t) {
   TensorSet tensors;
   model_.save(tensors, true);
-  photoLoss_.exposures().save(tensors);
   budget_.save(tensors);
   return tensors.encode({{"format", "tessera mesh 1"}, {"device", device_.target()}});
 }
 
 std::optional<uint32_t> MeshTrainer::firstNonFinitePart() {
-  return model_.allFinite() && photoLoss_.exposures().allFinite() ? std::nullopt : std::optional<uint32_t>(0);
+  return model_.allFinite() ? std::nullopt : std::optional<uint32_t>(0);
 }
 
 void MeshTrainer::restore(uint32_t, const fs::path& path, const Safetensors& state) {
   requireFormat(path, state, "tessera mesh 1", "mesh");
   warnOfOtherDevice(path, state, device_.target());
   model_.restore(path, state);
-  photoLoss_.exposures().restore(path, state);
   budget_.restore(path, state);
 }
 

@@ -1,5 +1,4 @@
-// One training step of the `mesh` representation: rays → hits on octahedra → field → two images → losses → gradients →
-// Adam.
+// One training step of a part of a mesh: rays → hits on octahedra → field → two images → losses → gradients → Adam.
 #pragma once
 
 #include "representations/mesh/train/mesh_model.h"
@@ -13,8 +12,10 @@ namespace tessera {
 class MeshTrainer final : public TrainableModel {
  public:
   // Keeps references to `device` and `capture`. Trains on the capture's training photos.
-  MeshTrainer(Device& device, const Capture& capture, const MeshConfig& config, const SceneFrame& frame,
-              MeshStart start);
+  MeshTrainer(Device& device, const Capture& capture, const MeshConfig& config, const MeshPart& part, MeshStart start);
+  // Compares with photos at the exposures that a checkpoint of the coarse field holds, which are the same for all parts
+  // and are not trained further. Throws Error if it holds none of these photos.
+  void useExposures(const fs::path& path, const Safetensors& coarse) { photoLoss_.exposures().restore(path, coarse); }
 
   StepReport step(int64_t step, int64_t plannedSteps) override;
   Bytes save(uint32_t part) override;
@@ -37,7 +38,8 @@ class MeshTrainer final : public TrainableModel {
     MeshField::Output output;
     Slice<float> losses;
   };
-  // The first loss, of all hits, sets the gradients of samples; the second, of opaque hits, adds to them.
+  // The first loss, of all hits, sets the gradients of samples; the second, of opaque hits, adds to them. Outside, all
+  // hits stand before the sky, and there is no second loss.
   void addVolumeLoss(const Batch& batch, double weight);
   void addOpaqueLoss(const Batch& batch, double weight, double threshold);
   void updateParameters(int64_t step, int64_t plannedSteps);
@@ -50,7 +52,7 @@ class MeshTrainer final : public TrainableModel {
   RayBudget budget_;
   MeshHits hits_;
   Array<uint32_t> counters_;
-  Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, losses_;
+  Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, skyColour_, losses_;
   Array<float> sampleWeights_, sampleSteps_, weightGradients_, logitGradients_, sampleColourGradients_,
       positionGradients_;
 };

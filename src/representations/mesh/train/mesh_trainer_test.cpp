@@ -7,36 +7,22 @@
 #include <map>
 
 #include "representations/field/testing/trained_cube.h"
+#include "representations/mesh/testing/small_mesh.h"
 #include "representations/mesh/train/extraction.h"
 #include "representations/mesh/train/mesh_renderer.h"
 
 namespace tessera {
 namespace {
 
-// A model that is small enough to train within seconds.
-MeshConfig smallMeshConfig() {
-  MeshConfig config;
-  config.gridLevels = 6;
-  config.gridLog2Size = 13;
-  config.gridBase = 8;
-  config.gridFinest = 96;
-  config.width = 16;
-  config.meshCells = 16;
-  config.meshLevels = 2;
-  config.occupancyStartSteps = 64;
-  config.occupancyEvery = 8;
-  config.vertexStartSteps = 40;
-  config.samplesPerStep = 16384;
-  config.maxRays = 4096;
-  config.learningRate = 2e-2;
-  config.exposure = false;
-  return config;
+// The region of interest of the cube as one block.
+MeshPart wholeCube(const CubeScene& scene) {
+  return {"block_0_0", 0, fitSceneFrame(scene.capture(), 0.5), {1, 1, 1}};
 }
 
 // Training that starts everywhere, from all pixels.
-MeshStart startEverywhere(const CubeScene& scene, const MeshConfig& config) {
+MeshStart startEverywhere(const CubeScene& scene, const OctahedraDomain& domain) {
   MeshStart start;
-  start.cells.assign(config.grid(0).cells(), true);
+  start.cells.assign(size_t{domain.latticeCells()} * domain.latticeCells() * domain.latticeCells(), true);
   start.tiles.resize(scene.capture().photos.size());
   for (const int photo : scene.capture().photosIn(Split::train))
     start.tiles[photo] = {{{photo, 0, 0, CubeScene::kWidth, CubeScene::kHeight}},
@@ -51,14 +37,14 @@ struct TrainedMesh {
 
   TrainedMesh(const CubeScene& scene, const MeshConfig& config, int64_t steps, int threads = 2)
       : device(makeDevice({"cpu", threads})),
-        trainer(std::make_unique<MeshTrainer>(*device, scene.capture(), config, fitSceneFrame(scene.capture(), 0.5),
-                                              startEverywhere(scene, config))) {
+        trainer(std::make_unique<MeshTrainer>(*device, scene.capture(), config, wholeCube(scene),
+                                              startEverywhere(scene, config.domain(wholeCube(scene), 0)))) {
     for (int64_t step = 0; step < steps; ++step) last = trainer->step(step, steps);
   }
 };
 
 double heldOutPsnr(const CubeScene& scene, MeshModel& model, uint32_t level = 0) {
-  MeshRenderer renderer(model, level);
+  MeshPartRenderer renderer(model, level);
   double sum = 0;
   const std::vector<int> photos = scene.capture().photosIn(Split::test);
   for (const int index : photos) {
@@ -89,6 +75,7 @@ std::map<std::string, Bytes> finestTensors(const Bytes& checkpoint) {
 TEST(MeshTrainer, TrainsCoarseLevelsThatChangeNothingElse) {
   const CubeScene scene;
   MeshConfig config = smallMeshConfig(), alone = config;
+  config.meshCells = alone.meshCells = 32;
   config.meshLevels = 3;
   alone.meshLevels = 1;
   constexpr int64_t kSteps = 400;
@@ -98,7 +85,7 @@ TEST(MeshTrainer, TrainsCoarseLevelsThatChangeNothingElse) {
   ASSERT_EQ(model.levels(), 3u);
   for (uint32_t number = 0; number < 3; ++number) {
     MeshLevel& level = model.level(number);
-    EXPECT_EQ(level.grid().resolution, 16u >> number);
+    EXPECT_EQ(level.domain().grids.at(0).resolution, 32u >> number);
     double largest = 0;
     for (const float d : trained.device->read(level.displacements().values.all()))
       largest = std::max(largest, std::abs(double{d}));
@@ -126,14 +113,14 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   EXPECT_GT(some.count(), 50u);
   EXPECT_LT(some.count(), most.count());
   EXPECT_LT(most.count(), faces.count());
-  EXPECT_LT(faces.count(), 20 * model.level(0).grid().cells() / 10);
-  for (uint32_t face = 0; face < 20 * model.level(0).grid().cells(); ++face) {
+  EXPECT_LT(faces.count(), 20 * model.level(0).domain().grids[0].cells() / 10);
+  for (uint32_t face = 0; face < 20 * model.level(0).domain().grids[0].cells(); ++face) {
     EXPECT_LE(some.contains(face), most.contains(face)) << "rays were added";
     EXPECT_LE(most.contains(face), faces.contains(face)) << "rays were added";
   }
   model.level(0).keepFaces(faces.bits());
   EXPECT_GT(heldOutPsnr(scene, model), before - 1.5);
-  model.level(0).keepFaces(FaceSet(model.level(0).grid()).bits());
+  model.level(0).keepFaces(FaceSet(model.level(0).domain().grids).bits());
   EXPECT_LT(heldOutPsnr(scene, model), before - 3) << "without faces nothing is left";
   model.level(0).keepFaces({});
   EXPECT_EQ(heldOutPsnr(scene, model), before);
@@ -180,23 +167,17 @@ TEST(MeshTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
   EXPECT_EQ(state, unbroken.trainer->save(0));
 }
 
-TEST(MeshStart, FindsTheCellsAndPixelsOfSurfacesInTheRegion) {
+TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
   const CubeScene scene;
   TrainedCube coarse(scene, cubeConfig(), 300);
-  MeshConfig config = smallMeshConfig();
-  config.meshCells = 32;
-  const MeshStart start = findMeshStart(scene.capture(), coarse.trainer->model(), config);
-  const SceneFrame& frame = coarse.frame;
+  const SurfaceSurvey survey(scene.capture(), coarse.trainer->model());
+  const MeshPart block{"block_0_0", 0, coarse.frame, {1, 1, 1}};
+  const OctahedraDomain domain = makeOctahedraDomain(block, 32, OctahedraPlacement::checkerboard);
+  const MeshStart start = survey.findStart(block, domain);
   // Every point of the cube's surface lies in such a cell; few other cells are marked.
   size_t marked = 0;
   for (const bool cell : start.cells) marked += cell;
   EXPECT_LT(marked, start.cells.size() / 2);
-  const auto cellAt = [&](const Vec3d& world) {
-    const Vec3d g = (frame.sceneFromWorld(world) + Vec3d::Ones()) * (config.meshCells / 2.0);
-    const auto place = [&](double x) { return static_cast<size_t>(std::clamp(x, 0.0, config.meshCells - 1.0)); };
-    const size_t n = static_cast<size_t>(config.meshCells);
-    return place(g.x()) + n * (place(g.y()) + n * place(g.z()));
-  };
   int missing = 0, all = 0;
   for (const double u : {-0.45, -0.2, 0.0, 0.25, 0.45})
     for (const double v : {-0.4, -0.1, 0.15, 0.4})
@@ -206,8 +187,10 @@ TEST(MeshStart, FindsTheCellsAndPixelsOfSurfacesInTheRegion) {
           at[axis] = side;
           at[(axis + 1) % 3] = u;
           at[(axis + 2) % 3] = v;
+          const auto cell = domain.latticeCell(block.frame.sceneFromWorld(CubeScene::centre() + at));
+          ASSERT_TRUE(cell);
           ++all;
-          missing += !start.cells[cellAt(CubeScene::centre() + at)];
+          missing += !start.cells[*cell];
         }
   EXPECT_LE(missing, all / 20);
   // Photos are transparent around the cube, so only the tiles on it are used.
@@ -217,6 +200,15 @@ TEST(MeshStart, FindsTheCellsAndPixelsOfSurfacesInTheRegion) {
     EXPECT_LT(share, 1) << photo;
   }
   for (const int photo : scene.capture().photosIn(Split::test)) EXPECT_TRUE(start.tiles[photo].tiles.empty());
+  // Nothing but the sky is outside of a region around the cube: those pixels that show no surface.
+  const MeshPart outside{"background", -1, coarse.frame, {1, 1, 1}};
+  const MeshStart sky = survey.findStart(outside, makeOctahedraDomain(outside, 16, OctahedraPlacement::checkerboard));
+  for (const int photo : scene.capture().photosIn(Split::train))
+    EXPECT_NEAR(start.tiles[photo].total() + sky.tiles[photo].total(), CubeScene::kWidth * CubeScene::kHeight, 1);
+  // A block beside the cube has nothing to show.
+  MeshPart beside = block;
+  beside.frame.centre += beside.frame.worldFromScene({3, 0, 0}) - beside.frame.worldFromScene({0, 0, 0});
+  EXPECT_EQ(survey.findStart(beside, makeOctahedraDomain(beside, 32, OctahedraPlacement::checkerboard)).pixels(), 0);
 }
 
 TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
@@ -224,9 +216,9 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
   MeshConfig config = smallMeshConfig();
   config.opacityOffset = 0;
   config.everyCell = true;
-  MeshModel model(*device, config, {});
+  MeshModel model(*device, config, {"block_0_0", 0, {}, {1, 1, 1}});
   MeshLevel& level = model.level(0);
-  level.exclude(std::vector<bool>(config.grid(0).cells(), true));
+  level.exclude(std::vector<bool>(level.domain().grids[0].cells(), true));
   // One ray straight down through the middle of a column of cells, whose first hit is opaque and the second is not.
   const Array<float> origins = device->uploadArray(std::vector<float>{0.07f, 0.05f, 3}),
                      directions = device->uploadArray(std::vector<float>{0, 0, -1});
@@ -238,15 +230,15 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
   std::vector<float> logits(kMaxHits, 5);
   logits[0] = 0;  // half opaque; the second hit leaves a transmittance below a hundredth
   const Array<float> opacities = device->uploadArray(logits);
-  level.trace(rays, kMaxHits, hits);
+  level.trace(rays, kMaxHits, false, hits);
   const uint32_t all = device->read(counters.all())[0];
   ASSERT_GT(all, 20u);
   const std::vector<float> positions = device->read(hits.positions.part(0, size_t{3} * all));
   for (int update = 0; update < 40; ++update) {
     level.addOccupancy(rays, hits, Matrix<const float>(opacities.all(), 1));
-    level.refreshOccupancy();
+    level.refreshOccupancy(true);
   }
-  std::vector<uint32_t> expected(config.grid(0).words());
+  std::vector<uint32_t> expected(level.domain().grids[0].words());
   for (const uint32_t reached : {0u, 1u}) {
     uint32_t cell = 0;
     for (int axis = 2; axis >= 0; --axis) {
@@ -256,7 +248,7 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
     expected[cell / 32] |= 1u << cell % 32;
   }
   EXPECT_EQ(level.occupancy().bitWords(), expected);
-  level.trace(rays, kMaxHits, hits);
+  level.trace(rays, kMaxHits, false, hits);
   EXPECT_LT(device->read(counters.all())[0], all / 2) << "hits beyond the surface and its neighbours";
 }
 

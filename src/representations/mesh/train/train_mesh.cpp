@@ -2,72 +2,181 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <limits>
 
-#include "base/memory.h"
+#include "base/error.h"
+#include "base/log.h"
 #include "representations/field/train/train_field.h"
+#include "representations/mesh/train/trained_mesh.h"
 #include "train/colour_loss.h"
 #include "train/run_folder.h"
 
 namespace tessera {
 namespace {
 
-constexpr double kPhotoMemoryFraction = 0.5;  // of the usable memory
-constexpr double kLeastShare = 0.1;           // of the minutes, that the mesh trains for at least
+constexpr double kTexelsPerCell = 8;  // of a block's finest triangles, along an edge
+constexpr double kLeastMinutes = 0.05;
+// The training loop derives the number of a block's steps from their speed before the coarse levels begin, and they
+// take this many times as long in the end (measured once, on a synthetic city).
+constexpr double kSlowing = 1.27;
 
-// The coarse field needs no details: only where surfaces are.
+class Stopwatch {
+ public:
+  double minutes() const {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count() / 60;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// The coarse field needs no details: only where surfaces are, and the exposures of the photos.
 FieldConfig coarseConfig(const MeshConfig& config) {
   FieldConfig coarse;
   coarse.seed = config.seed;
-  coarse.roiMargin = config.roiMargin;
   coarse.photoBudgetMiB = config.photoBudgetMiB;
   coarse.samplesPerStep = 1 << 15;
   coarse.gridLog2Size = 15;
   coarse.gridLevels = 8;
   coarse.gridFinest = 256;
   coarse.exposure = config.exposure;
+  coarse.exposureLearningRate = config.exposureLearningRate;
   return coarse;
+}
+
+PartitionRequirements partitionRequirements(const MeshConfig& config) {
+  return {[&] {
+            BlockLimits limits;
+            limits.texelsPerEdge = static_cast<int>(config.meshCells * kTexelsPerCell);
+            limits.memoryBudget = std::numeric_limits<double>::infinity();  // only one block is trained at a time
+            return limits;
+          },
+          {kEnoughPhotos, int64_t{config.meshCells} * config.meshCells},
+          config.photoBudgetMiB};
+}
+
+// Trains the coarse field. Returns false if it was asked to stop.
+bool trainCoarseField(Device& device, const Capture& capture, const fs::path& model, const TrainMeshOptions& options) {
+  const ModelFolder folder = coarseFolder(model);
+  FieldConfig coarse = coarseConfig(options.config);
+  TrainingLoopOptions loop = options.loop;
+  loop.resume = folder.manifest().has_value();
+  if (loop.minutes > 0) {
+    loop.minutes *= options.config.coarseShare;
+  } else {
+    loop.steps = options.config.coarseSteps;
+  }
+  if (loop.resume) {
+    coarse.photoBudgetMiB = savedConfig<FieldConfig>(folder.root()).photoBudgetMiB;
+    requireSameConfig(folder.root(), coarse);
+  }
+  return trainField(device, capture, folder.root(), {coarse, loop}).finished;
+}
+
+// A part that is to be trained, with its share of the time that remains.
+struct PlannedPart {
+  MeshPart part;
+  MeshStart start;
+  double share = 0;
+};
+
+// Returns the parts that photos show something of, in the order in which they are trained: first the background block.
+std::vector<PlannedPart> planParts(const Capture& capture, const std::vector<MeshPart>& parts,
+                                   const SurfaceSurvey& survey, const MeshConfig& config) {
+  std::vector<PlannedPart> planned;
+  double blockPixels = 0, backgroundPixels = 0;
+  for (const MeshPart& part : parts) {
+    PlannedPart plan{part, survey.findStart(part, config.domain(part, 0))};
+    if (plan.start.isEmpty()) {
+      if (!part.isBackground()) warn("{}: no training photo shows a surface in it; it stays empty", part.name);
+      continue;
+    }
+    (part.isBackground() ? backgroundPixels : blockPixels) += plan.start.pixels();
+    planned.push_back(std::move(plan));
+  }
+  if (blockPixels == 0) {
+    throw Error(capture.root.string(), "transforms.json", "no training photo shows a surface in a block",
+                "check the camera poses and the masks");
+  }
+  constexpr double kLeastShare = 0.03;
+  double background = 0;
+  if (backgroundPixels > 0) {
+    background =
+        std::min(config.backgroundShare, std::max(kLeastShare, backgroundPixels / (backgroundPixels + blockPixels)));
+  }
+  for (PlannedPart& plan : planned)
+    plan.share = plan.part.isBackground() ? background : (1 - background) * plan.start.pixels() / blockPixels;
+  if (backgroundPixels > 0) std::rotate(planned.begin(), planned.end() - 1, planned.end());
+  return planned;
 }
 
 }  // namespace
 
 TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path& model, TrainMeshOptions options) {
-  const auto start = std::chrono::steady_clock::now();
-  options.config.check();
-  colourLossKind(options.config.loss);  // throws Error
-  refuseCaptureFolder(model);
-  const ModelFolder folder(model);
+  const Stopwatch stopwatch;
+  MeshConfig& config = options.config;
+  config.check();
+  colourLossKind(config.loss);  // throws Error
   options.loop.method = "mesh";
-  refuseTrainedModel(folder, options.loop);
-  const bool goesOn = options.loop.resume && folder.manifest().has_value();
-  if (goesOn) requireTrainedOn(folder, capture);
-  options.config.photoBudgetMiB = resolvePhotoBudget(options.config.photoBudgetMiB, capture,
-                                                     kPhotoMemoryFraction * static_cast<double>(usableMemoryBytes()));
-
-  const ModelFolder coarseFolder(model / "coarse");
-  if (!options.loop.resume) fs::remove_all(coarseFolder.root());
-  FieldConfig coarse = coarseConfig(options.config);
-  TrainingLoopOptions coarseLoop = options.loop;
-  coarseLoop.minutes = 0;
-  coarseLoop.steps = options.config.coarseSteps;
-  coarseLoop.resume = coarseFolder.manifest().has_value();
-  if (coarseLoop.resume) coarse.photoBudgetMiB = savedConfig<FieldConfig>(coarseFolder.root()).photoBudgetMiB;
-  requireSameConfig(coarseFolder.root(), coarse);
-  if (!trainField(device, capture, coarseFolder.root(), {coarse, coarseLoop}).finished) return {};
-
-  const SceneFrame frame = (goesOn ? folder : coarseFolder).readPlacement().frame;
-  MeshStart meshStart = findMeshStart(capture, *loadFieldModel(device, coarseFolder.root()), options.config);
-  MeshTrainer trainer(device, capture, options.config, frame, std::move(meshStart));
-  if (!folder.manifest()) {
-    writeFileAtomically(folder.configPath(),
-                        reproductionHeader(device, options.loop) + configToToml(options.config.fields()));
-    folder.writePlacement({frame, {}, capture.sourceFromWorld, capture.root, trainingNames(capture)},
-                          options.loop.method);
+  const BlockRun run = openBlockRun(capture, model, options, partitionRequirements(config));
+  config.photoBudgetMiB = run.photoBudgetMiB;
+  const std::vector<MeshPart> parts = makeMeshParts(run.grid, config.hasBackground());
+  if (!run.goesOn) {
+    fs::remove_all(model / "parts");
+    if (!options.loop.resume) fs::remove_all(model / "coarse");
+    writeFileAtomically(run.folder.configPath(), reproductionHeader(device, options.loop, " --grid blocks.json") +
+                                                     configToToml(config.fields()));
+    run.folder.writePlacement({{}, run.grid, capture.sourceFromWorld, capture.root, trainingNames(capture)}, "mesh");
   }
-  if (!goesOn && options.loop.minutes > 0) {  // the coarse field has taken its share
-    const double minutes = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() / 60;
-    options.loop.minutes = std::max(options.loop.minutes - minutes, kLeastShare * options.loop.minutes);
+  if (!trainCoarseField(device, capture, model, options)) return {};
+  writeMeshManifest(model, parts);
+
+  std::vector<PlannedPart> planned;
+  fs::path coarseFile;
+  {
+    const auto coarse = loadFieldModel(device, coarseFolder(model).root());
+    planned = planParts(capture, parts, SurfaceSurvey(capture, *coarse), config);
+    coarseFile = coarseFolder(model).root() / requireManifest(coarseFolder(model)).files.at(0);
   }
-  return runTraining(trainer, folder, options.loop);
+  const Safetensors coarseState = readSafetensors(coarseFile);
+  TrainingResult sum;
+  sum.finished = true;
+  double shareLeft = 0, samples = 0;
+  for (const PlannedPart& plan : planned) shareLeft += plan.share;
+  for (PlannedPart& plan : planned) {
+    const ModelFolder folder = partFolder(model, plan.part);
+    TrainingLoopOptions loop = options.loop;
+    loop.resume = folder.manifest().has_value();
+    if (loop.minutes > 0) {
+      const double left = run.goesOn ? (1 - config.coarseShare) * shareLeft * options.loop.minutes
+                                     : options.loop.minutes - stopwatch.minutes();
+      loop.minutes = std::max(kLeastMinutes, left * plan.share / shareLeft);
+      if (!plan.part.isBackground()) loop.minutes /= kSlowing;
+    } else if (plan.part.isBackground()) {
+      const int64_t steps = loop.steps > 0 ? loop.steps : kDefaultSteps;
+      loop.steps = std::max<int64_t>(1, std::llround(static_cast<double>(steps) * config.backgroundShare));
+    }
+    shareLeft -= plan.share;
+    const double pixels = plan.start.pixels();
+    MeshTrainer trainer(device, capture, config, plan.part, std::move(plan.start));
+    if (config.exposure) trainer.useExposures(coarseFile, coarseState);
+    inform("{}: {:.0f} pixels of the photos show it", plan.part.name, pixels);
+    fs::create_directories(folder.root());
+    const TrainingResult result = runTraining(trainer, folder, loop);
+    writeMeshManifest(model, parts);
+    sum.step += result.step;
+    sum.plannedSteps += result.plannedSteps;
+    sum.seconds += result.seconds;
+    samples += result.seconds * result.samplesPerSecond;
+    if (!plan.part.isBackground()) sum.psnr = result.psnr;
+    if (!result.finished) {
+      sum.finished = false;
+      break;
+    }
+  }
+  sum.samplesPerSecond = samples / std::max(1e-9, sum.seconds);
+  return sum;
 }
 
 }  // namespace tessera
