@@ -61,6 +61,45 @@ TEST_P(DeviceProperties, OpacityIsTheSumOfWeights) {
   }
 }
 
+// UE4-NeRF: the two losses compare with the same image where the second excludes nothing.
+TEST_P(DeviceProperties, OpaqueImageIsTheCompositeByItsOpacityWhereNothingIsExcluded) {
+  Stage stage(*device, 72);
+  const uint32_t rays = 50;
+  const std::vector<uint32_t> first = stage.random.firstSamples(rays, 20);
+  CompositeForward all;
+  all.extinction = Extinction::logit;
+  all.rays.capacity = rays;
+  all.firstSample = stage.input(first);
+  all.x = stage.randomMatrix(first.back(), 1, Layout::plain, -4, -3);  // so faint that no ray ends early
+  all.offset = -0.5f;
+  all.colours = stage.randomMatrix(first.back(), 3, Layout::plain, 0, 1);
+  all.colour = stage.output("colour", 3 * rays);
+  all.opacity = stage.output("opacity", rays);
+  all.weights = stage.output("weights", first.back());
+  device->run(all);
+  OpaqueForward opaque;
+  opaque.offset = all.offset;
+  opaque.rays = all.rays;
+  opaque.firstSample = all.firstSample;
+  opaque.x = all.x;
+  opaque.colours = all.colours;
+  opaque.colour = stage.output("opaqueColour", 3 * rays);
+  opaque.opacity = stage.output("opaqueOpacity", rays);
+  device->run(opaque);
+  const std::vector<float> colour = device->read(all.colour), opacity = device->read(all.opacity);
+  const std::vector<float> divided = device->read(opaque.colour), same = device->read(opaque.opacity);
+  int compared = 0;
+  for (uint32_t ray = 0; ray < rays; ++ray) {
+    if (opacity[ray] < 0.01f) continue;
+    ++compared;
+    EXPECT_LT(opacity[ray], opaque.maxOpacity);
+    EXPECT_NEAR(same[ray], opacity[ray], 2e-6) << "ray " << ray;
+    for (uint32_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(divided[3 * ray + c], colour[3 * ray + c] / opacity[ray], 2e-4) << "ray " << ray;
+  }
+  EXPECT_GT(compared, 20);
+}
+
 TEST_P(DeviceProperties, MarchingInRoundsMakesTheSamplesOfOneMarch) {
   Stage stage(*device, 74);
   const uint32_t rays = 50, capacity = 20000;

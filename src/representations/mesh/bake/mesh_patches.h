@@ -1,0 +1,41 @@
+// Arranges the triangles that extraction keeps as patches of texels: two triangles with a common edge share a patch.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "compute/octahedra.h"
+#include "scene/axes.h"
+
+namespace tessera {
+
+// Triangles with shared vertices, in the frame of a part.
+struct TriangleList {
+  std::vector<Vec3d> vertices;
+  std::vector<std::array<uint32_t, 3>> triangles;  // indices of vertices
+  std::vector<uint32_t> gridOfTriangle;
+};
+
+// Returns those of the given faces (bits of face numbers, TraceOctahedra::keptFaces) that exist and whose centre lies
+// in the box of the grid of the same number in `owners`, so that neighbouring parts do not repeat each other's
+// triangles. displacements: [grids][cells][3].
+TriangleList listTriangles(OctahedraGrids grids, OctahedraGrids owners, const std::vector<float>& displacements,
+                           const std::vector<uint32_t>& faceBits);
+
+// Corners in the order of MeshContent: (0, 1, 2) is the first triangle, (3, 2, 1) the second.
+struct TrianglePatch {
+  std::array<uint32_t, 4> corners{};  // indices of vertices; without a second triangle the last one is unused
+  uint32_t grid = 0;
+  bool isPair = false;
+};
+
+// Pairs triangles that share an edge, the flattest pairs first. Returns the pairs, then single triangles.
+std::vector<TrianglePatch> pairTriangles(const TriangleList& list);
+
+// The position in the scene of a texel of a patch, which continues the first triangle's plane where there is no second
+// one. `column`, `row`: in units of texels, T - 1 at the last.
+Vec3d texelPosition(const std::array<Vec3d, 4>& corners, bool isPair, double column, double row, uint32_t patchEdge);
+
+}  // namespace tessera

@@ -1,0 +1,88 @@
+#include "representations/mesh/bake/mesh_patches.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+namespace tessera {
+namespace {
+
+// A strip of triangles (0, 1, 2), (1, 2, 3), (2, 3, 4), …, folded by 90° between the second and the third.
+TriangleList foldedStrip() {
+  TriangleList list;
+  list.vertices = {{0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {1, 1, 0}, {1, 0, 1}, {1, 1, 1}};
+  for (uint32_t i = 0; i < 4; ++i) list.triangles.push_back({i, i + 1, i + 2});
+  list.gridOfTriangle.assign(4, 0);
+  return list;
+}
+
+TEST(MeshPatches, PairTheFlattestTrianglesThatShareAnEdge) {
+  const std::vector<TrianglePatch> patches = pairTriangles(foldedStrip());
+  ASSERT_EQ(patches.size(), 2u);
+  std::set<std::set<uint32_t>> corners;
+  for (const TrianglePatch& patch : patches) {
+    EXPECT_TRUE(patch.isPair);
+    corners.insert({patch.corners.begin(), patch.corners.end()});
+    EXPECT_NE(patch.corners[0], patch.corners[3]);
+  }
+  EXPECT_EQ(corners, (std::set<std::set<uint32_t>>{{0, 1, 2, 3}, {2, 3, 4, 5}})) << "not across the fold";
+}
+
+TEST(MeshPatches, HoldEveryTriangleOnce) {
+  TriangleList list = foldedStrip();
+  list.triangles.push_back({0, 1, 4});  // one too many for pairs
+  list.gridOfTriangle.push_back(0);
+  const std::vector<TrianglePatch> patches = pairTriangles(list);
+  std::multiset<std::set<uint32_t>> expected, inPatches;
+  for (const auto& t : list.triangles) expected.insert({t[0], t[1], t[2]});
+  bool hasSingle = false;
+  for (const TrianglePatch& patch : patches) {
+    EXPECT_FALSE(hasSingle && patch.isPair) << "pairs come first";
+    hasSingle = hasSingle || !patch.isPair;
+    const auto& c = patch.corners;
+    inPatches.insert({c[0], c[1], c[2]});
+    if (patch.isPair) inPatches.insert({c[3], c[2], c[1]});
+  }
+  EXPECT_EQ(inPatches, expected);
+  EXPECT_TRUE(hasSingle);
+}
+
+TEST(MeshPatches, HaveTexelsOnTheirTriangles) {
+  const std::array<Vec3d, 4> corners = {Vec3d{0, 0, 0}, Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{1, 1, 0.5}};
+  constexpr uint32_t kEdge = 5;
+  EXPECT_EQ(texelPosition(corners, true, 0, 0, kEdge), corners[0]);
+  EXPECT_EQ(texelPosition(corners, true, 4, 0, kEdge), corners[1]);
+  EXPECT_EQ(texelPosition(corners, true, 0, 4, kEdge), corners[2]);
+  EXPECT_EQ(texelPosition(corners, true, 4, 4, kEdge), corners[3]);
+  EXPECT_EQ(texelPosition(corners, true, 2, 2, kEdge), Vec3d(0.5, 0.5, 0)) << "on the common edge";
+  EXPECT_EQ(texelPosition(corners, true, 4, 2, kEdge), Vec3d(1, 0.5, 0.25));
+  EXPECT_EQ(texelPosition(corners, false, 4, 4, kEdge), Vec3d(1, 1, 0)) << "the first triangle's plane goes on";
+}
+
+TEST(MeshPatches, AreOfTheGridThatOwnsTheCentre) {
+  OctahedraGrid grid{8, OctahedraPlacement::all};
+  grid.gridFromScene = {4, 0, 0, 4, 0, 4, 0, 4, 0, 0, 4, 4, 0, 0, 0, 1};
+  OctahedraGrid left = grid, right = grid;
+  left.highest[0] = right.lowest[0] = 3.7f;
+  const std::vector<float> displacements(size_t{3} * grid.cells(), 0.1f);
+  std::vector<uint32_t> bits(faceWords({&grid, 1}));
+  size_t faces = 0;
+  for (uint32_t cell = 0; cell < grid.cells(); ++cell) {
+    const uint32_t place[3] = {cell % 8, cell / 8 % 8, cell / 64};
+    if (std::min({place[0], place[1], place[2]}) == 0 || std::max({place[0], place[1], place[2]}) == 7) continue;
+    for (uint32_t local = 0; local < kFacesPerCell; ++local, ++faces)
+      bits[(cell * kFacesPerCell + local) / 32] |= 1u << (cell * kFacesPerCell + local) % 32;
+  }
+  const auto count = [&](const OctahedraGrid& owner) {
+    return listTriangles({&grid, 1}, {&owner, 1}, displacements, bits).triangles.size();
+  };
+  EXPECT_EQ(count(grid), faces);
+  EXPECT_GT(count(left), faces / 4);
+  EXPECT_EQ(count(left) + count(right), faces);
+  const TriangleList all = listTriangles({&grid, 1}, {&grid, 1}, displacements, bits);
+  EXPECT_EQ(all.vertices.size(), 8u * 8 * 8 - 8 - 12 * 6) << "shared by all triangles; corners and edges have none";
+  for (const Vec3d& vertex : all.vertices) EXPECT_LT(vertex.cwiseAbs().maxCoeff(), 1);
+}
+
+}  // namespace
+}  // namespace tessera

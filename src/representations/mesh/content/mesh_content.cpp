@@ -1,0 +1,72 @@
+#include "representations/mesh/content/mesh_content.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/check.h"
+
+namespace tessera {
+
+uint8_t FeatureRange::encode(float value) const {
+  if (!(high > low)) return 0;
+  return static_cast<uint8_t>(std::clamp((value - low) / (high - low) * 255 + 0.5f, 0.0f, 255.0f));
+}
+
+MeshTexel mixTexels(const MeshContent& content, uint32_t patch, float column, float row) {
+  const uint32_t edge = content.patchEdge;
+  const auto cell = [&](float at) { return std::min(static_cast<uint32_t>(std::max(0.0f, at)), edge - 2); };
+  const uint32_t x = cell(column), y = cell(row);
+  const float right = std::clamp(column - static_cast<float>(x), 0.0f, 1.0f);
+  const float lower = std::clamp(row - static_cast<float>(y), 0.0f, 1.0f);
+  const uint8_t* const texels = content.texels.data() + size_t{kMeshNumbers} * edge * edge * patch;
+  std::array<float, kMeshNumbers> bytes{};
+  for (uint32_t corner = 0; corner < 4; ++corner) {
+    const uint32_t dx = corner & 1, dy = corner >> 1;
+    const float weight = (dx ? right : 1 - right) * (dy ? lower : 1 - lower);
+    const uint8_t* const texel = texels + size_t{kMeshNumbers} * (x + dx + edge * (y + dy));
+    for (uint32_t i = 0; i < kMeshNumbers; ++i) bytes[i] += weight * texel[i];
+  }
+  MeshTexel mixed;
+  for (uint32_t i = 0; i < kMeshFeatures; ++i) {
+    const FeatureRange& range = content.ranges[i];
+    mixed.features[i] = range.low + (range.high - range.low) * (bytes[i] / 255);
+  }
+  mixed.opacity = bytes[kMeshFeatures] / 255;
+  return mixed;
+}
+
+std::array<float, 9> meshHarmonics(const float d[3]) {
+  const float x = d[0], y = d[1], z = d[2];
+  return {0.28209479177387814f,
+          -0.48860251190291987f * y,
+          0.48860251190291987f * z,
+          -0.48860251190291987f * x,
+          1.0925484305920792f * x * y,
+          -1.0925484305920792f * y * z,
+          0.94617469575755997f * z * z - 0.31539156525251999f,
+          -1.0925484305920792f * x * z,
+          0.54627421529603959f * (x * x - y * y)};
+}
+
+std::array<float, 3> decodeColour(const std::vector<DenseLayer>& decoder,
+                                  const std::array<float, kMeshFeatures>& features,
+                                  const std::array<float, 9>& harmonics) {
+  std::array<float, kMaxLayerWidth> input{}, output{};
+  std::copy(features.begin(), features.end(), input.begin());
+  std::copy(harmonics.begin(), harmonics.end(), input.begin() + kMeshFeatures);
+  for (size_t l = 0; l < decoder.size(); ++l) {
+    const DenseLayer& layer = decoder[l];
+    for (uint32_t o = 0; o < layer.outputs; ++o) {
+      float sum = layer.biases.empty() ? 0 : layer.biases[o];
+      for (uint32_t i = 0; i < layer.inputs; ++i) sum += layer.weights[size_t{o} * layer.inputs + i] * input[i];
+      output[o] = l + 1 < decoder.size() ? std::max(0.0f, sum) : sum;
+    }
+    input = output;
+  }
+  CHECK(decoder.back().outputs == 3u);
+  std::array<float, 3> colour{};
+  for (int c = 0; c < 3; ++c) colour[c] = 1 / (1 + std::exp(-input[c]));
+  return colour;
+}
+
+}  // namespace tessera
