@@ -28,6 +28,7 @@ struct TrainFlags {
   std::string method = std::string(methods().front()->name), configFile, blocks = kAutoBlocks, grid;
   std::vector<std::string> settings;
   std::string seed, residentBlocks;
+  std::vector<std::string> only;
   DeviceOptions device;
   std::string capture, model;
   TrainingLoopOptions loop;
@@ -81,6 +82,10 @@ bool swapsBlocks(const Method& method) {
   return method.swapsBlocks;
 }
 
+bool trainsPartsAlone(const Method& method) {
+  return method.partsAlone;
+}
+
 // Throws Error if the model to resume is of another method, whose settings this method could not interpret.
 void requireSameMethod(const TrainFlags& flags) {
   const auto manifest = flags.loop.resume ? ModelFolder(flags.model).manifest() : std::nullopt;
@@ -96,6 +101,10 @@ TrainingResult train(Device& device, const TrainFlags& flags) {
   const Capture capture = readCapture(flags.capture);
   BlockRunOptions options;
   options.loop = flags.loop;
+  options.only = flags.only;
+  if (!method.partsAlone && !flags.only.empty()) {
+    throw CLI::ValidationError("--only-blocks", "applies to --method " + namesOfMethods(trainsPartsAlone) + " only");
+  }
   if (method.trainsInBlocks) {
     const std::optional<BlockCount> blocks = parseBlockCount(flags.blocks);
     if (!blocks) throw CLI::ValidationError("--blocks", "'" + flags.blocks + "' is neither auto nor of the form 2x2");
@@ -172,6 +181,11 @@ void addTrainVerb(CLI::App& app) {
                                "--set resident_blocks=...",
                                namesOfMethods(swapsBlocks)))
       ->check(CLI::Range(1, 1 << 20));
+  verb->add_option("--only-blocks", flags->only,
+                   fmt::format("of --method {}: train only these, separated by commas, as block_0_1,background; other "
+                               "processes may train others. coarse: only what all need first",
+                               namesOfMethods(trainsPartsAlone)))
+      ->delimiter(',');
   verb->add_option("--memory-mib", flags->memoryMiB,
                    ofBlocks + "memory for which to plan blocks and photos; default: the machine's")
       ->check(amount(1, 1e9));

@@ -76,6 +76,7 @@ TEST(Methods, OfferWhatTheirRowOfTheListSays) {
     EXPECT_EQ(isBaked(*method), isScene) << method->name;
     EXPECT_TRUE(isScene || method->bakeParameters.empty()) << method->name;
     EXPECT_TRUE(method->trainsInBlocks || !method->swapsBlocks) << method->name;
+    EXPECT_TRUE(method->trainsInBlocks || !method->partsAlone) << method->name;
     const std::vector<ConfigField> fields = method->settings("")->fields();
     const auto has = [&](std::string_view name) {
       return std::any_of(fields.begin(), fields.end(), [&](const ConfigField& field) { return field.name == name; });

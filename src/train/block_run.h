@@ -5,6 +5,8 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "compute/device.h"
 #include "partition/cut_blocks.h"
@@ -18,6 +20,7 @@ struct BlockRunOptions {
   std::optional<BlockGrid> grid;  // if given, the blocks to use; overrides `blocks`
   double memoryMiB = 0;           // memory budget for blocks and photos, MiB; 0: the machine's usable memory
   uint64_t gpuBytes = 0;          // Device::ownMemory of the training device, which stores the blocks; 0: none
+  std::vector<std::string> only;  // of a method that trains its parts by themselves: the names of these; empty: all
 
   double plannedBytes() const;    // memoryMiB, or the machine's usable memory
   double bytesForBlocks() const;  // share of plannedBytes or of the GPU's memory; the rest is working memory of steps

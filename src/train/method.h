@@ -107,6 +107,7 @@ struct Method {
   std::string_view summary;     // one line for --help
   bool trainsInBlocks = false;  // uses all of BlockRunOptions rather than their `loop` alone
   bool swapsBlocks = false;     // can train with only some blocks in memory (the setting resident_blocks)
+  bool partsAlone = false;      // trains blocks by themselves, and only some if asked to (BlockRunOptions::only)
   bool countsSamples = false;   // implements OpenedModel::rayWork
 
   // Returns the default settings, or those of the preset if `preset` names one. Throws Error if there is no such

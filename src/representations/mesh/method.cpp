@@ -34,6 +34,7 @@ const Method& meshMethod() {
       .name = "mesh",
       .summary = "triangles whose colours a small network decodes (UE4-NeRF)",
       .trainsInBlocks = true,
+      .partsAlone = true,
       .settings = makeSettings<MeshConfig>,
       .train = train,
       .openModel = openModel,

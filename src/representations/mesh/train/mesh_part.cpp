@@ -36,24 +36,27 @@ std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool outside) {
 
 std::optional<uint32_t> OctahedraDomain::latticeCell(const Vec3d& point) const {
   const uint32_t lattice = latticeCells();
-  for (const OctahedraGrid& grid : grids) {
-    double g[4];
-    for (size_t row = 0; row < 4; ++row) {
-      const float* const m = grid.gridFromScene.data() + 4 * row;
-      g[row] = m[3];
-      for (int column = 0; column < 3; ++column) g[row] += double{m[column]} * point[column];
+  Triple<double> at;  // in cells of the lattice
+  if (boxInFront[0] > 0) {
+    Triple<double> x;
+    for (int axis = 0; axis < 3; ++axis) x[axis] = point[axis] / boxInFront[axis];
+    const int axis = farthestAxis(x);
+    const double farthest = std::abs(x[axis]), halfCells = lattice / 4.0;
+    if (farthest <= 1 || farthest >= halfCells / 2 || (axis == 2 && x[2] < 0)) return std::nullopt;
+    x = contract(x);
+    for (int a = 0; a < 3; ++a) at[a] = (x[a] + 2) * halfCells;
+  } else {
+    const OctahedraGrid& grid = grids[0];
+    for (int axis = 0; axis < 3; ++axis) {
+      const float* const m = grid.gridFromScene.data() + size_t{4} * axis;
+      at[axis] = m[0] * point.x() + m[1] * point.y() + m[2] * point.z() + m[3];
+      if (!(at[axis] >= grid.lowest[axis] && at[axis] < std::min<double>(lattice, grid.highest[axis])))
+        return std::nullopt;
     }
-    if (g[3] <= 0) continue;
-    bool inside = true;
-    uint32_t cell = 0;
-    for (int axis = 2; axis >= 0; --axis) {
-      const double at = g[axis] / g[3];
-      inside = inside && at >= grid.lowest[axis] && at < std::min<double>(grid.resolution, grid.highest[axis]);
-      cell = cell * lattice + static_cast<uint32_t>(std::max(0.0, at + grid.positionOffset[axis]));
-    }
-    if (inside) return cell;
   }
-  return std::nullopt;
+  uint32_t cell = 0;
+  for (int axis = 2; axis >= 0; --axis) cell = cell * lattice + std::min(static_cast<uint32_t>(at[axis]), lattice - 1);
+  return cell;
 }
 
 std::vector<uint32_t> OctahedraDomain::toGrids(const std::vector<uint32_t>& latticeBits) const {

@@ -83,19 +83,30 @@ MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& 
   const double coarseCell = (space_.contracted ? 4.0 : 2.0) / n / frame_.scale;
   const double meshCell = 2.0 / domain.latticeCells() / part.frame.scale;
   const int points = std::clamp(static_cast<int>(std::ceil(2 * coarseCell / meshCell)), 4, 16);
+  const auto toWorld = [&](const int place[3], const double within[3]) {
+    Triple<double> x;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double u = (place[axis] + within[axis]) / n;
+      x[axis] = space_.contracted ? 4 * u - 2 : 2 * u - 1;
+    }
+    if (space_.contracted) x = uncontract(x);
+    return frame_.worldFromScene({x[0], x[1], x[2]});
+  };
   for (int cell = 0; cell < n * n * n; ++cell) {
     if ((cells_[static_cast<size_t>(cell / 32)] >> cell % 32 & 1) == 0) continue;
     const int place[3] = {cell % n, cell / n % n, cell / (n * n)};
+    if (!part.isBackground()) {
+      // A cell whose middle is farther from the grid than the cell is wide cannot overlap with it.
+      const double middle[3] = {0.5, 0.5, 0.5}, corner[3] = {0, 0, 0};
+      const Vec3d inPart = part.frame.sceneFromWorld(toWorld(place, middle));
+      const double radius = (part.frame.sceneFromWorld(toWorld(place, corner)) - inPart).norm();
+      if (inPart.cwiseAbs().maxCoeff() > 1 / (1 - 2 * kBlockMargin) + 2 * radius) continue;
+    }
     for (int point = 0; point < points * points * points; ++point) {
       const int within[3] = {point % points, point / points % points, point / (points * points)};
-      Triple<double> x;
-      for (int axis = 0; axis < 3; ++axis) {
-        const double u = (place[axis] + (within[axis] + 0.5) / points) / n;
-        x[axis] = space_.contracted ? 4 * u - 2 : 2 * u - 1;
-      }
-      if (space_.contracted) x = uncontract(x);
-      const Vec3d world = frame_.worldFromScene({x[0], x[1], x[2]});
-      if (const auto at = domain.latticeCell(part.frame.sceneFromWorld(world))) start.cells[*at] = true;
+      const double inCell[3] = {(within[0] + 0.5) / points, (within[1] + 0.5) / points, (within[2] + 0.5) / points};
+      if (const auto at = domain.latticeCell(part.frame.sceneFromWorld(toWorld(place, inCell))))
+        start.cells[*at] = true;
     }
   }
 

@@ -30,12 +30,12 @@ MeshStart startEverywhere(const CubeScene& scene, const OctahedraDomain& domain)
   return start;
 }
 
-struct TrainedMesh {
+struct CubeTraining {
   std::unique_ptr<Device> device;
   std::unique_ptr<MeshTrainer> trainer;
   StepReport last;
 
-  TrainedMesh(const CubeScene& scene, const MeshConfig& config, int64_t steps, int threads = 2)
+  CubeTraining(const CubeScene& scene, const MeshConfig& config, int64_t steps, int threads = 2)
       : device(makeDevice({"cpu", threads})),
         trainer(std::make_unique<MeshTrainer>(*device, scene.capture(), config, wholeCube(scene),
                                               startEverywhere(scene, config.domain(wholeCube(scene), 0)))) {
@@ -58,7 +58,7 @@ double heldOutPsnr(const CubeScene& scene, MeshModel& model, uint32_t level = 0)
 
 TEST(MeshTrainer, LearnsWhatHeldOutPhotosSee) {
   const CubeScene scene;
-  TrainedMesh trained(scene, smallMeshConfig(), 400);
+  CubeTraining trained(scene, smallMeshConfig(), 400);
   EXPECT_GT(heldOutPsnr(scene, trained.trainer->model()), 17);
 }
 
@@ -79,7 +79,7 @@ TEST(MeshTrainer, TrainsCoarseLevelsThatChangeNothingElse) {
   config.meshLevels = 3;
   alone.meshLevels = 1;
   constexpr int64_t kSteps = 400;
-  TrainedMesh trained(scene, config, kSteps), single(scene, alone, kSteps);
+  CubeTraining trained(scene, config, kSteps), single(scene, alone, kSteps);
   EXPECT_EQ(finestTensors(trained.trainer->save(0)), finestTensors(single.trainer->save(0)));
   MeshModel& model = trained.trainer->model();
   ASSERT_EQ(model.levels(), 3u);
@@ -97,7 +97,7 @@ TEST(MeshTrainer, TrainsCoarseLevelsThatChangeNothingElse) {
 
 TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   const CubeScene scene;
-  TrainedMesh trained(scene, smallMeshConfig(), 400);
+  CubeTraining trained(scene, smallMeshConfig(), 400);
   MeshModel& model = trained.trainer->model();
   const double before = heldOutPsnr(scene, model);
   ExtractionSettings few;
@@ -130,7 +130,7 @@ TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {
   const CubeScene scene;
   MeshConfig still = smallMeshConfig();
   still.vertexLearningRate = 0;
-  TrainedMesh moved(scene, smallMeshConfig(), 400), unmoved(scene, still, 400);
+  CubeTraining moved(scene, smallMeshConfig(), 400), unmoved(scene, still, 400);
   EXPECT_GT(heldOutPsnr(scene, moved.trainer->model()), heldOutPsnr(scene, unmoved.trainer->model()));
   double largest = 0;
   for (const float d : moved.device->read(moved.trainer->model().level(0).displacements().values.all()))
@@ -143,19 +143,19 @@ TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {
 
 TEST(MeshTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
   const CubeScene scene;
-  const Bytes one = TrainedMesh(scene, smallMeshConfig(), 90, 1).trainer->save(0);
-  EXPECT_EQ(one, TrainedMesh(scene, smallMeshConfig(), 90, 2).trainer->save(0));
-  EXPECT_EQ(one, TrainedMesh(scene, smallMeshConfig(), 90, 5).trainer->save(0));
+  const Bytes one = CubeTraining(scene, smallMeshConfig(), 90, 1).trainer->save(0);
+  EXPECT_EQ(one, CubeTraining(scene, smallMeshConfig(), 90, 2).trainer->save(0));
+  EXPECT_EQ(one, CubeTraining(scene, smallMeshConfig(), 90, 5).trainer->save(0));
 }
 
 TEST(MeshTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
   const CubeScene scene;
   constexpr int64_t kSteps = 90;
-  TrainedMesh unbroken(scene, smallMeshConfig(), kSteps);
+  CubeTraining unbroken(scene, smallMeshConfig(), kSteps);
   Bytes state;
   int64_t step = 0;
   for (const int64_t until : {0, 1, 15, 17, 64, 65, 72, 90}) {
-    TrainedMesh part(scene, smallMeshConfig(), 0);
+    CubeTraining part(scene, smallMeshConfig(), 0);
     if (!state.empty()) {
       const auto file = decodeSafetensors(state);
       ASSERT_TRUE(file);

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "base/error.h"
 #include "base/log.h"
@@ -54,6 +55,41 @@ PartitionRequirements partitionRequirements(const MeshConfig& config) {
           },
           {kEnoughPhotos, int64_t{config.meshCells} * config.meshCells},
           config.photoBudgetMiB};
+}
+
+constexpr const char* kCoarse = "coarse";
+
+// Parts that have not begun have no record of how long they are to be trained: the run keeps one in run.json. Without
+// --steps and --minutes, a resumed run takes them from there. Throws Error if the file is malformed.
+void keepLength(const fs::path& model, TrainingLoopOptions& loop) {
+  const fs::path file = model / "run.json";
+  if (loop.steps > 0 || loop.minutes > 0) {
+    const nlohmann::json length = {{"steps", loop.steps}, {"minutes", loop.minutes}};
+    writeFileAtomically(file, length.dump(2) + "\n");
+    return;
+  }
+  if (!fs::exists(file)) return;
+  const nlohmann::json length = nlohmann::json::parse(readTextFile(file), nullptr, false);
+  const auto number = [&](const char* key) {
+    if (!length.is_object() || !length.contains(key) || !length[key].is_number() || length[key].get<double>() < 0 ||
+        length[key].get<double>() > 1e12) {
+      throw Error(file.string(), key, "is missing, or not a number that is possible", "give --steps or --minutes");
+    }
+    return length[key].get<double>();
+  };
+  loop.steps = static_cast<int64_t>(number("steps"));
+  loop.minutes = number("minutes");
+}
+
+// Throws Error if a part that was asked for does not exist.
+void requireParts(const std::vector<std::string>& only, const std::vector<MeshPart>& parts) {
+  std::string names = kCoarse;
+  for (const MeshPart& part : parts) names += ", " + part.name;
+  for (const std::string& name : only) {
+    const bool exists = name == kCoarse || std::any_of(parts.begin(), parts.end(),
+                                                       [&](const MeshPart& part) { return part.name == name; });
+    if (!exists) throw Error("--only-blocks " + name, "", "there is no such block", "use some of " + names);
+  }
 }
 
 // Trains the coarse field. Returns false if it was asked to stop.
@@ -122,15 +158,27 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
   const BlockRun run = openBlockRun(capture, model, options, partitionRequirements(config));
   config.photoBudgetMiB = run.photoBudgetMiB;
   const std::vector<MeshPart> parts = makeMeshParts(run.grid, config.hasBackground());
+  requireParts(options.only, parts);
   if (!run.goesOn) {
     fs::remove_all(model / "parts");
+    if (!options.loop.resume) fs::remove(model / "run.json");
     if (!options.loop.resume) fs::remove_all(model / "coarse");
     writeFileAtomically(run.folder.configPath(), reproductionHeader(device, options.loop, " --grid blocks.json") +
                                                      configToToml(config.fields()));
     run.folder.writePlacement({{}, run.grid, capture.sourceFromWorld, capture.root, trainingNames(capture)}, "mesh");
   }
+  keepLength(model, options.loop);
   if (!trainCoarseField(device, capture, model, options)) return {};
   writeMeshManifest(model, parts);
+  const auto isRequested = [&](const std::string& name) {
+    return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
+  };
+  TrainingResult sum;
+  sum.finished = true;
+  if (!options.only.empty() &&
+      std::none_of(parts.begin(), parts.end(), [&](const MeshPart& part) { return isRequested(part.name); })) {
+    return sum;  // only the coarse field
+  }
 
   std::vector<PlannedPart> planned;
   fs::path coarseFile;
@@ -140,17 +188,17 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
     coarseFile = coarseFolder(model).root() / requireManifest(coarseFolder(model)).files.at(0);
   }
   const Safetensors coarseState = readSafetensors(coarseFile);
-  TrainingResult sum;
-  sum.finished = true;
   double shareLeft = 0, samples = 0;
   for (const PlannedPart& plan : planned) shareLeft += plan.share;
   for (PlannedPart& plan : planned) {
     const ModelFolder folder = partFolder(model, plan.part);
+    if (!isRequested(plan.part.name)) continue;
     TrainingLoopOptions loop = options.loop;
     loop.resume = folder.manifest().has_value();
     if (loop.minutes > 0) {
-      const double left = run.goesOn ? (1 - config.coarseShare) * shareLeft * options.loop.minutes
-                                     : options.loop.minutes - stopwatch.minutes();
+      const double left = run.goesOn || !options.only.empty()
+                              ? (1 - config.coarseShare) * shareLeft * options.loop.minutes
+                              : options.loop.minutes - stopwatch.minutes();
       loop.minutes = std::max(kLeastMinutes, left * plan.share / shareLeft);
       if (!plan.part.isBackground()) loop.minutes /= kSlowing;
     } else if (plan.part.isBackground()) {

@@ -1,0 +1,118 @@
+#include "representations/mesh/train/train_mesh.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "base/error.h"
+#include "base/file.h"
+#include "representations/mesh/testing/small_mesh.h"
+#include "representations/mesh/train/mesh_renderer.h"
+#include "train/testing/cube_scene.h"
+
+namespace tessera {
+namespace {
+
+constexpr int64_t kSteps = 20;
+
+TrainMeshOptions smallOptions() {
+  TrainMeshOptions options;
+  options.config = smallMeshConfig();
+  options.config.coarseSteps = 20;
+  options.config.meshCells = 16;
+  options.blocks = {false, 2, 1};
+  options.loop.steps = kSteps;
+  options.loop.progress = false;
+  options.loop.checkpointSeconds = 1e6;
+  return options;
+}
+
+// Returns the last checkpoints of all parts and of the coarse field.
+std::map<std::string, Bytes> lastCheckpoints(const fs::path& mesh) {
+  std::map<std::string, Bytes> files;
+  std::vector<fs::path> folders = {mesh / "coarse"};
+  for (const auto& entry : fs::directory_iterator(mesh / "parts")) folders.push_back(entry.path());
+  for (const fs::path& folder : folders) {
+    const auto manifest = ModelFolder(folder).manifest();
+    if (!manifest) continue;
+    files[folder.filename().string()] = readFile(folder / manifest->files.at(0));
+  }
+  return files;
+}
+
+class TrainMesh : public testing::Test {
+ protected:
+  TrainMesh() : device(makeDevice({"cpu", 2})) {}
+  TrainingResult train(const std::string& name, const TrainMeshOptions& options) {
+    return trainMesh(*device, scene.capture(), scene / name, options);
+  }
+
+  const CubeScene scene;
+  const std::unique_ptr<Device> device;
+};
+
+TEST_F(TrainMesh, EndsWithTheSameBytesHoweverOftenItIsStopped) {
+  EXPECT_TRUE(train("whole", smallOptions()).finished);
+  const auto whole = lastCheckpoints(scene / "whole");
+  ASSERT_EQ(whole.size(), 4u) << "coarse field, two blocks, background block";
+
+  TrainMeshOptions options = smallOptions();
+  int stops = 0;
+  for (bool finished = false; !finished; ++stops) {
+    ASSERT_LT(stops, 20);
+    int asked = 0;
+    options.loop.stopRequested = [&] { return ++asked > 11; };
+    finished = train("stopped", options).finished;
+    options.loop.resume = true;
+    options.loop.steps = 0;  // as the run had planned
+  }
+  EXPECT_GT(stops, 4);
+  EXPECT_EQ(lastCheckpoints(scene / "stopped"), whole);
+  EXPECT_EQ(requireManifest(ModelFolder(scene / "stopped")).step, 2 * kSteps + kSteps * 15 / 100);
+}
+
+TEST_F(TrainMesh, TrainsPartsAloneToTheSameBytes) {
+  EXPECT_TRUE(train("whole", smallOptions()).finished);
+  TrainMeshOptions options = smallOptions();
+  options.only = {"coarse"};
+  EXPECT_TRUE(train("apart", options).finished);
+  EXPECT_THROW(loadTrainedMesh(*device, scene / "apart"), Error) << "nothing but the coarse field";
+  options.loop.resume = true;
+  for (const std::vector<std::string>& only :
+       std::vector<std::vector<std::string>>{{"block_1_0"}, {"background", "block_0_0"}}) {
+    options.only = only;
+    EXPECT_TRUE(train("apart", options).finished);
+  }
+  EXPECT_EQ(lastCheckpoints(scene / "apart"), lastCheckpoints(scene / "whole"));
+}
+
+TEST_F(TrainMesh, RefusesPartsThatDoNotExist) {
+  TrainMeshOptions options = smallOptions();
+  options.only = {"block_2_0"};
+  try {
+    train("none", options);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("coarse, block_0_0, block_1_0, background"), std::string::npos)
+        << error.what();
+  }
+  EXPECT_FALSE(fs::exists(scene / "none" / "config.toml"));
+}
+
+TEST_F(TrainMesh, WithoutABackgroundBlockTrainsBlocksAlone) {
+  TrainMeshOptions options = smallOptions();
+  options.config.backgroundBlock = "none";
+  EXPECT_TRUE(train("mesh", options).finished);
+  EXPECT_EQ(lastCheckpoints(scene / "mesh").count("background"), 0u);
+  TrainedMesh mesh = loadTrainedMesh(*device, scene / "mesh");
+  ASSERT_EQ(mesh.parts.size(), 2u);
+  // A ray that misses the region sees nothing.
+  MeshRenderer renderer(mesh);
+  Pose away = scene.capture().photos[0].worldFromCamera;
+  away.rotation = away.rotation * Eigen::AngleAxisd(3.14159, Vec3d::UnitY()).toRotationMatrix();
+  const RenderedView view = renderer.render(scene.capture().cameras[0].scaledTo(8, 6), away, nullptr);
+  for (const float opacity : view.opacity.pixels) EXPECT_LT(opacity, 0.5f);
+}
+
+}  // namespace
+}  // namespace tessera
