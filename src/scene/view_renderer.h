@@ -17,6 +17,12 @@ struct RenderedView {
   ImageF depth;
 };
 
+// Returns a view of the camera's size that shows nothing.
+inline RenderedView makeEmptyView(const Camera& camera) {
+  return {ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
+          ImageF(camera.width, camera.height, 1)};
+}
+
 // Composites the view over a background colour. Returns the final image: 3 channels, opaque.
 inline ImageF compositeOver(const RenderedView& view, const Eigen::Array3f& background) {
   ImageF image = view.colour;

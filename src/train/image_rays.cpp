@@ -50,6 +50,18 @@ ImageRays::Piece ImageRays::piece(size_t first, uint32_t maximum) {
   return result;
 }
 
+void ImageRays::renderInPieces(uint32_t sampleCapacity, const std::function<Rendered(const Piece&, size_t)>& render) {
+  constexpr double kFirst = 1024, kLeast = 64, kFull = 0.9;
+  double next = kFirst;  // rays of the next piece, predicted from the samples of the last one
+  for (size_t first = 0; first < lattice_.count();) {
+    const double limit = std::clamp(next, std::min<double>(kLeast, maxRays_), static_cast<double>(maxRays_));
+    const Rendered rendered = render(piece(first, static_cast<uint32_t>(limit)), first);
+    CHECK(rendered.rays >= 1u);
+    first += rendered.rays;
+    next = kFull * sampleCapacity / std::max(1.0, rendered.samples / static_cast<double>(rendered.rays));
+  }
+}
+
 ImageRays::Piece ImageRays::through(std::span<const float> pixels) {
   const uint32_t rays = static_cast<uint32_t>(pixels.size() / 2);
   CHECK(rays <= maxRays_);

@@ -2,6 +2,8 @@
 // finding out what a photo sees of it.
 #pragma once
 
+#include <functional>
+
 #include "compute/device.h"
 #include "scene/capture.h"
 #include "scene/view_renderer.h"
@@ -36,6 +38,15 @@ class ImageRays {
   };
   // Returns the rays of pixels [first, first + maximum) of the lattice, or fewer. Valid until the next piece.
   Piece piece(size_t first, uint32_t maximum);
+  // What a renderer made of a piece: the rays that fitted into its buffers, at least one, and the number of their
+  // samples in the fullest buffer.
+  struct Rendered {
+    uint32_t rays = 0, samples = 0;
+  };
+  // Calls `render(piece, first)` for pieces that together are the whole lattice; `first`: the pixel of a piece's first
+  // ray. Rays that do not fit are in the next piece, whose size is chosen so that all will. `sampleCapacity`: of a
+  // buffer.
+  void renderInPieces(uint32_t sampleCapacity, const std::function<Rendered(const Piece&, size_t first)>& render);
   // Returns rays through the given pixel positions, [rays][2], at most `maxRays`; without far. Valid until the next
   // piece.
   Piece through(std::span<const float> pixels);

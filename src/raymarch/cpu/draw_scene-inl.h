@@ -170,8 +170,7 @@ RenderedView drawScene(const SceneDrawing<Content>& drawing, const PixelDirectio
   using draw_scene::kTile;
   const Camera& camera = directions.camera();
   const TileFrame& frame = drawing.frame;
-  RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
-                    ImageF(camera.width, camera.height, 1)};
+  RenderedView view = makeEmptyView(camera);
   const Mat3d sceneFromCamera = frame.rotation.transpose() * worldFromCamera.rotation;
   const Vec3d origin = frame.inScene(worldFromCamera.translation);
   const int columns = (camera.width + kTile - 1) / kTile, rows = (camera.height + kTile - 1) / kTile;

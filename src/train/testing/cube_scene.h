@@ -47,8 +47,7 @@ class CubeScene {
 
   // Renders the ground truth: premultiplied colour, opacity and z-depth (0 where there is nothing).
   RenderedView truth(const Camera& camera, const Pose& pose) const {
-    RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
-                      ImageF(camera.width, camera.height, 1)};
+    RenderedView view = makeEmptyView(camera);
     constexpr int kGrid = 3;  // subpixels
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {

@@ -119,12 +119,9 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
   Device& device = model_.device();
   imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
                    opaqueDepth);
-  RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
-                    ImageF(camera.width, camera.height, 1)};
-  const size_t pixelCount = view.opacity.pixels.size();
-  uint32_t nextRays = 1024;  // rays of the next batch, predicted from the samples of the last one
-  for (size_t first = 0; first < pixelCount;) {
-    const RoundCounts counts = renderPiece(imageRays_.piece(first, nextRays));
+  RenderedView view = makeEmptyView(camera);
+  imageRays_.renderInPieces(kSamples, [&](const ImageRays::Piece& piece, size_t first) {
+    const RoundCounts counts = renderPiece(piece);
     const uint32_t finished = counts.finished;
     const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
     const std::vector<float> opacity = device.read(opacity_.part(0, finished));
@@ -133,11 +130,9 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < finished; ++ray)
       view.depth.pixels[first + ray] = imageRays_.toViewDepth(ray, depth[ray]);
-    first += finished;
     // Each round of marching, and the set of visible samples, has a capacity of kSamples.
-    const double fitting = 0.9 * kSamples / std::max(1.0, counts.fullest / (1.0 * finished));
-    nextRays = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
-  }
+    return ImageRays::Rendered{finished, static_cast<uint32_t>(counts.fullest)};
+  });
   return view;
 }
 

@@ -15,9 +15,6 @@
 
 namespace tessera {
 
-// Returns the first 16 real spherical harmonics of a unit direction, in the order and with the signs of tiny-cuda-nn.
-std::array<float, 16> evaluateHarmonics(const Vec3d& direction);
-
 // Composites C_d = Σ_k T_k C_d^k, and F in the same way, with T_k = Π_{j<k} (1 - α^j). One network is evaluated for
 // each ray: z = C_d + ψ(C_d, F, harmonics), and the colour is (1 - T) sigmoid(z). If the contents have a learned
 // background and no other object stands at the ray's end, the pixel is opaque with the colour sigmoid(z). Contents with

@@ -4,6 +4,7 @@
 
 #include "raymarch/cpu/draw_scene.h"
 #include "representations/hash/testing/test_hash_content.h"
+#include "scene/spherical_harmonics.h"
 
 namespace tessera {
 namespace {

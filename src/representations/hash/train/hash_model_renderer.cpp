@@ -29,13 +29,9 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
   Device& device = model_.device();
   imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
                    opaqueDepth);
-  RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
-                    ImageF(camera.width, camera.height, 1)};
+  RenderedView view = makeEmptyView(camera);
   const bool learned = model_.config().background == "learned";
-  const size_t pixelCount = view.opacity.pixels.size();
-  uint32_t nextRays = 1024;  // rays of the next batch, predicted from the samples of the last one
-  for (size_t first = 0; first < pixelCount;) {
-    const ImageRays::Piece piece = imageRays_.piece(first, nextRays);
+  imageRays_.renderInPieces(kSamples, [&](const ImageRays::Piece& piece, size_t first) {
     const HashModel::Rays rays{piece.rays, piece.origins, piece.directions, {}, {}, piece.far};
     pipeline_.forward(rays, kDrawingMinTransmittance);
     const RoundCounts counts(device.read(pipeline_.counters()), HashSamples::kRounds);
@@ -54,11 +50,9 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
       const float seenDepth = isOpaque ? depth[ray] / std::max(opacity[ray], 1e-6f) : depth[ray];
       view.depth.pixels[pixel] = imageRays_.toViewDepth(ray, seenDepth);
     }
-    first += finished;
     // Each round of marching, and the set of visible samples, has a capacity of kSamples.
-    const double fitting = 0.9 * kSamples / std::max(1.0, counts.fullest / (1.0 * finished));
-    nextRays = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
-  }
+    return ImageRays::Rendered{finished, static_cast<uint32_t>(counts.fullest)};
+  });
   return view;
 }
 

@@ -26,7 +26,7 @@ MeshContent square() {
     }
   for (uint32_t f = 0; f < kMeshFeatures; ++f) content.ranges[f] = {-1, 1.55f};
   DenseLayer layer;
-  layer.inputs = kMeshFeatures + 9;
+  layer.inputs = kMeshFeatures + kMeshHarmonics;
   layer.outputs = 3;
   layer.weights.resize(size_t{layer.inputs} * 3);
   for (int c = 0; c < 3; ++c) layer.weights[size_t{layer.inputs} * c + c] = 1;

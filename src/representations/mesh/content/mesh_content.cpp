@@ -35,25 +35,12 @@ MeshTexel mixTexels(const MeshContent& content, uint32_t patch, float column, fl
   return mixed;
 }
 
-std::array<float, 9> meshHarmonics(const float d[3]) {
-  const float x = d[0], y = d[1], z = d[2];
-  return {0.28209479177387814f,
-          -0.48860251190291987f * y,
-          0.48860251190291987f * z,
-          -0.48860251190291987f * x,
-          1.0925484305920792f * x * y,
-          -1.0925484305920792f * y * z,
-          0.94617469575755997f * z * z - 0.31539156525251999f,
-          -1.0925484305920792f * x * z,
-          0.54627421529603959f * (x * x - y * y)};
-}
-
 std::array<float, 3> decodeColour(const std::vector<DenseLayer>& decoder,
                                   const std::array<float, kMeshFeatures>& features,
-                                  const std::array<float, 9>& harmonics) {
+                                  const std::array<float, 16>& harmonics) {
   std::array<float, kMaxLayerWidth> input{}, output{};
   std::copy(features.begin(), features.end(), input.begin());
-  std::copy(harmonics.begin(), harmonics.end(), input.begin() + kMeshFeatures);
+  std::copy_n(harmonics.begin(), kMeshHarmonics, input.begin() + kMeshFeatures);
   for (size_t l = 0; l < decoder.size(); ++l) {
     const DenseLayer& layer = decoder[l];
     for (uint32_t o = 0; o < layer.outputs; ++o) {

@@ -11,6 +11,7 @@
 namespace tessera {
 
 inline constexpr uint32_t kMeshFeatures = 8;
+inline constexpr uint32_t kMeshHarmonics = 9;  // of the direction, inputs of the decoder after the features
 inline constexpr uint32_t kMeshNumbers = kMeshFeatures + 1;  // of a texel: the features, and the opacity
 
 // The values that a byte stands for: linear from `low` (0) to `high` (255).
@@ -44,11 +45,10 @@ struct MeshTexel {
 // Mixes the texels of a patch at texel coordinates in [0, T-1].
 MeshTexel mixTexels(const MeshContent& content, uint32_t patch, float column, float row);
 
-// The nine spherical harmonics of a unit direction up to degree 2, as SphericalHarmonicsForward.
-std::array<float, 9> meshHarmonics(const float direction[3]);
-// The colour of features seen along a direction: the decoder's output through a sigmoid.
+// The colour of features seen along a direction, whose evaluateHarmonics() these are: the decoder's output through a
+// sigmoid.
 std::array<float, 3> decodeColour(const std::vector<DenseLayer>& decoder,
                                   const std::array<float, kMeshFeatures>& features,
-                                  const std::array<float, 9>& harmonics);
+                                  const std::array<float, 16>& harmonics);
 
 }  // namespace tessera

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "base/error.h"
+#include "scene/spherical_harmonics.h"
 
 namespace tessera {
 namespace {
@@ -126,8 +127,7 @@ CompositedRay compositeHits(std::vector<MeshTracer::Hit>& hits, const Vec3f& dir
   std::sort(hits.begin(), hits.end(), [](const MeshTracer::Hit& a, const MeshTracer::Hit& b) {
     return a.distance != b.distance ? a.distance < b.distance : a.patch < b.patch;
   });
-  const Vec3f unit = direction.normalized();
-  const std::array<float, 9> harmonics = meshHarmonics(unit.data());
+  const std::array<float, 16> harmonics = evaluateHarmonics(direction.cast<double>().normalized());
   CompositedRay ray;
   float transmittance = 1;
   for (const MeshTracer::Hit& hit : hits) {

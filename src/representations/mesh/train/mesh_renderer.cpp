@@ -70,12 +70,9 @@ RenderedView MeshPartRenderer::render(const Camera& camera, const Pose& worldFro
   Device& device = model_.device();
   imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
                    opaqueDepth);
-  RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
-                    ImageF(camera.width, camera.height, 1)};
-  const size_t pixelCount = view.opacity.pixels.size();
-  uint32_t nextRays = 1024;  // rays of the next batch, predicted from the hits of the last one
-  for (size_t first = 0; first < pixelCount;) {
-    const std::vector<uint32_t> counters = renderPiece(imageRays_.piece(first, nextRays));
+  RenderedView view = makeEmptyView(camera);
+  imageRays_.renderInPieces(kSamples, [&](const ImageRays::Piece& piece, size_t first) {
+    const std::vector<uint32_t> counters = renderPiece(piece);
     const uint32_t finished = counters[1];
     CHECK(finished >= 1u);  // one ray's hits always fit
     const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
@@ -94,10 +91,8 @@ RenderedView MeshPartRenderer::render(const Camera& camera, const Pose& worldFro
       const float seenDepth = hasSky ? depth[ray] / std::max(opacity[ray], 1e-6f) : depth[ray];
       view.depth.pixels[pixel] = imageRays_.toViewDepth(ray, seenDepth);
     }
-    first += finished;
-    const double fitting = 0.9 * kSamples / std::max(1.0, counters[0] / (1.0 * finished));
-    nextRays = static_cast<uint32_t>(std::clamp(fitting, 64.0, static_cast<double>(kRays)));
-  }
+    return ImageRays::Rendered{finished, counters[0]};
+  });
   return view;
 }
 
@@ -106,8 +101,7 @@ MeshRenderer::MeshRenderer(TrainedMesh& mesh) : mesh_(mesh) {
 }
 
 RenderedView MeshRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
-  RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
-                    ImageF(camera.width, camera.height, 1)};
+  RenderedView view = makeEmptyView(camera);
   const auto add = [&](int block) {
     for (size_t i = 0; i < parts_.size(); ++i)
       if (mesh_.parts[i]->part().block == block)

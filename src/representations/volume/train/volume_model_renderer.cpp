@@ -38,8 +38,7 @@ RenderedView VolumeModelRenderer::render(const Camera& camera, const Pose& world
   Device& device = model_.device();
   imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
                    opaqueDepth);
-  RenderedView view{ImageF(camera.width, camera.height, 3), ImageF(camera.width, camera.height, 1),
-                    ImageF(camera.width, camera.height, 1)};
+  RenderedView view = makeEmptyView(camera);
   VolumePipeline::Options options;
   options.minAlpha = minAlpha_;
   options.uniformFraction = kUniformFraction;
