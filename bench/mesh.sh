@@ -1,0 +1,89 @@
+#!/usr/bin/env bash
+# Meshes with neural textures (`--method mesh`) on the CPU.
+#   traversal    rays per second on a grid of octahedra against Embree, which collects all hits of the same rays on the same
+#                triangles in order of distance: a synthetic grid, and trained models if there are any (those that MODEL names,
+#                and those in build/bench/mesh); and how long Embree takes for a new hierarchy after a step has moved the vertices
+#   city         a city of 2x2 blocks, 15 minutes with the coarse field: held-out PSNR of the model and of its contents in memory
+#                (triangles with texels of 8 bits, traced by Embree), beside `field` in the same time; faces kept; time of baking
+#   fox, beach   the same for real photographs, 10 minutes each
+# Resumable: everything is kept in build/bench/mesh, and what exists is not made again; remove traversal-* there to repeat a row.
+#   [ROWS="traversal city fox beach"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
+# CAPTURE: the capture of MODEL, if it is not where its blocks.json says.
+set -euo pipefail
+source "$(dirname "$0")/setup.sh"
+work=$out/mesh
+mkdir -p "$work"
+
+# traced NAME ARGUMENTS...: compares the traversals once, prints the results, and checks that they are comparable.
+traced() {
+  local program=build/release/bench/octahedra_embree file=$work/traversal-$1.json
+  shift
+  if [ ! -s "$file" ]; then
+    [ -x "$program" ] || die "$program: not built; run: tools/build.sh release octahedra_embree"
+    alone "$program" "$@" 2> "$file.log" > "$file.part" || die "$(tail -n 1 "$file.log")"
+    rm "$file.log"
+    mv "$file.part" "$file"
+  fi
+  jq -r '.cases[] | (.orders[].table, .table)' "$file"
+  local name order share
+  while IFS=$'\t' read -r name order share; do
+    verdict "$name, $order: share of rays with the same faces as by Embree" "$share" '>=' 0.999
+  done < <(jq -r '.cases[] | .name as $name | .orders[] | [$name, .order, .agreement.share_with_equal_faces] | @tsv' "$file")
+}
+
+traversal() {
+  traced synthetic synthetic
+  [ -z "${MODEL:-}" ] || traced "$(basename "$MODEL")" "$MODEL" ${CAPTURE:+"$CAPTURE"}
+  local manifest
+  for manifest in "$work"/*/manifest.json; do
+    if [ -e "$manifest" ] && [ "$(jq -r .method "$manifest")" = mesh ]; then
+      traced "$(basename "$(dirname "$manifest")")" "$(dirname "$manifest")"
+    fi
+  done
+}
+
+# chained MODEL CAPTURE: what each step from the model to its contents loses, with patches of 8 and of 16 texels.
+chained() {
+  local program=build/release/bench/mesh_chain edge file
+  [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_chain"
+  for edge in 8 16; do
+    file=$work/chain-$1-$edge.json
+    if [ ! -s "$file" ]; then
+      "$program" "$work/$1" "$work/$2" "$edge" > "$file.part"
+      mv "$file.part" "$file"
+    fi
+    jq -r --arg edge "$edge" '"patches of \($edge) texels: model \(.model.psnr), faces kept \(.kept_faces.psnr), " +
+      "8 bits \(.texels_of_8_bits.psnr), opaque from 0.8 \(.["opaque_from_0.8"].psnr) dB; \(.triangles) triangles, " +
+      "\(.texel_bytes_bc4 / 1e6) MB of texels in BC4; extraction \(.extraction_seconds) s, baking \(.bake_seconds) s"' "$file"
+  done
+}
+contents() { jq -r '.["opaque_from_0.8"].psnr * 100 | round / 100' "$work/chain-$1-16.json"; }
+
+city() {
+  need_tessera
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  trained city-field city --method field --minutes 15
+  echo "city 2x2 after 15 min: field $(judged city-field city) dB, mesh $(judged city-mesh city) dB"
+  chained city-mesh city
+  verdict "city 2x2, held-out PSNR of the contents in dB" "$(contents city-mesh)" '>=' 24
+  verdict "city 2x2, field less the contents in dB" "$(shortfall "$(judged city-field city)" "$(contents city-mesh)")" '<=' 1.5
+}
+
+# photos NAME DOWNSCALE BOUND ARGUMENTS...: the same for real photographs.
+photos() {
+  need_tessera
+  local name=$1 downscale=$2 bound=$3
+  shift 3
+  [ -e "$work/$name/transforms.json" ] || "$tessera" import \
+    "${TESSERA_SHARED_DATA:?names no folder; it must hold $name/}/$name" "$work/$name" --downscale "$downscale" --holdout every:8
+  trained "$name-mesh" "$name" --method mesh --minutes 10 "$@"
+  echo "$name after 10 min: mesh $(judged "$name-mesh" "$name") dB"
+  chained "$name-mesh" "$name"
+  verdict "$name, held-out PSNR of the contents in dB" "$(contents "$name-mesh")" '>=' "$bound"
+}
+fox() { photos fox 2 27.2 --blocks 1x1; }
+beach() { photos brighton_beach 4 19.1; }
+
+for row in ${ROWS:-traversal city fox beach}; do "$row"; done
+finish
