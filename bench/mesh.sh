@@ -4,7 +4,7 @@
 #                triangles in order of distance: a synthetic grid, and trained models if there are any (those that MODEL names,
 #                and those in build/bench/mesh); and how long Embree takes for a new hierarchy after a step has moved the vertices
 #   city         a city of 2x2 blocks, 15 minutes with the coarse field: held-out PSNR of the model and of its contents in memory
-#                (triangles with texels of 8 bits, traced by Embree), beside `field` in the same time; faces kept; time of baking
+#                (triangles with texels in BC4, traced by Embree), beside `field` in the same time; faces kept; time of baking
 #   fox, beach   the same for real photographs, 10 minutes each
 # Resumable: everything is kept in build/bench/mesh, and what exists is not made again; remove traversal-* there to repeat a row.
 #   [ROWS="traversal city fox beach"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
@@ -25,10 +25,12 @@ traced() {
     mv "$file.part" "$file"
   fi
   jq -r '.cases[] | (.orders[].table, .table)' "$file"
-  local name order share
-  while IFS=$'\t' read -r name order share; do
+  local name order share ratio
+  while IFS=$'\t' read -r name order share ratio; do
     verdict "$name, $order: share of rays with the same faces as by Embree" "$share" '>=' 0.999
-  done < <(jq -r '.cases[] | .name as $name | .orders[] | [$name, .order, .agreement.share_with_equal_faces] | @tsv' "$file")
+    verdict "$name, $order: rays per second, relative to Embree's" "$ratio" '>=' 1
+  done < <(jq -r '.cases[] | .name as $name | .orders[] |
+    [$name, .order, .agreement.share_with_equal_faces, (.ratio * 100 | round / 100)] | @tsv' "$file")
 }
 
 traversal() {
@@ -53,11 +55,12 @@ chained() {
       mv "$file.part" "$file"
     fi
     jq -r --arg edge "$edge" '"patches of \($edge) texels: model \(.model.psnr), faces kept \(.kept_faces.psnr), " +
-      "8 bits \(.texels_of_8_bits.psnr), opaque from 0.8 \(.["opaque_from_0.8"].psnr) dB; \(.triangles) triangles, " +
+      "8 bits \(.texels_of_8_bits.psnr), opaque from 0.8 \(.["opaque_from_0.8"].psnr), " +
+      "BC4 \(.bc4_fast.psnr), exhaustive \(.bc4_exhaustive.psnr) dB; \(.triangles) triangles, " +
       "\(.texel_bytes_bc4 / 1e6) MB of texels in BC4; extraction \(.extraction_seconds) s, baking \(.bake_seconds) s"' "$file"
   done
 }
-contents() { jq -r '.["opaque_from_0.8"].psnr * 100 | round / 100' "$work/chain-$1-16.json"; }
+contents() { jq -r '.bc4_fast.psnr * 100 | round / 100' "$work/chain-$1-16.json"; }
 
 city() {
   need_tessera

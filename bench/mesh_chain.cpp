@@ -1,7 +1,7 @@
 // mesh_chain MODEL CAPTURE [PATCH_EDGE]: what each step from a trained mesh to its baked contents loses. Evaluates
 // held-out photos with the model; with the faces that extraction keeps; with the triangles of all parts and their
-// texels of 8 bits, traced by Embree; and with opacities that are stored as opaque from 0.8 on. Prints PSNR, SSIM, and
-// numbers of faces, patches and bytes as JSON. See mesh.sh.
+// texels of 8 bits, traced by Embree; with opacities that are stored as opaque from 0.8 on; and of these, after BC4
+// compression. Prints PSNR, SSIM, and numbers of faces, patches and bytes as JSON. See mesh.sh.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -170,6 +170,17 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
     }
     ContentsRenderer contentsRenderer(mesh, contents);
     evaluateAs(snapped ? "opaque_from_0.8" : "texels_of_8_bits", contentsRenderer);
+    if (!snapped || patchEdge % 4 != 0) continue;
+    for (const Bc4Effort effort : {Bc4Effort::fast, Bc4Effort::exhaustive}) {
+      std::vector<MeshContent> compressed = contents;
+      const auto compressing = Clock::now();
+      for (MeshContent& content : compressed) passThroughBc4(content, effort);
+      const double compressingSeconds = seconds(compressing);
+      const char* name = effort == Bc4Effort::fast ? "bc4_fast" : "bc4_exhaustive";
+      ContentsRenderer compressedRenderer(mesh, compressed);
+      evaluateAs(name, compressedRenderer);
+      result[name]["seconds"] = compressingSeconds;
+    }
   }
   return result;
 }

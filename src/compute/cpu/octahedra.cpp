@@ -11,6 +11,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <iterator>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -33,6 +35,20 @@ inline constexpr int kVertices = 27;          // of the cells around a cell; dx 
 inline constexpr int kSlots = 32;             // two vectors of 16; slots without a vertex hold NaN
 inline constexpr int kMaxCandidates = 112;    // a multiple of 16
 inline constexpr size_t kMaxHitsInCell = 64;  // the nearest are kept
+
+// The cell of a slot's vertex relative to the middle one; slots without a vertex hold NaN.
+struct SlotOffsets {
+  alignas(64) float at[3][kSlots] = {};
+
+  constexpr SlotOffsets() {
+    for (int slot = 0; slot < kSlots; ++slot) {
+      const int offsets[3] = {slot % 3 - 1, slot / 3 % 3 - 1, slot / 9 - 1};
+      for (int axis = 0; axis < 3; ++axis)
+        at[axis][slot] = slot < kVertices ? static_cast<float>(offsets[axis]) : std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+};
+inline constexpr SlotOffsets kSlotOffsets;
 
 // The faces that can reach into a cell.
 struct Candidates {
@@ -191,7 +207,7 @@ class Walk {
 
   // Returns false if the ray has all hits that it may have.
   bool run() {
-    for (auto& numbers : sheared_) std::fill(numbers, numbers + kSlots, std::numeric_limits<float>::quiet_NaN());
+    std::fill(std::begin(around_), std::end(around_), 0.0f);
     const double begin = near_, end = far_;
     double direction[3], largest = 0;
     for (int axis = 0; axis < 3; ++axis) {
@@ -249,28 +265,32 @@ class Walk {
     float origin[3];  // of the ray, relative to the centre of the cell
     for (int axis = 0; axis < 3; ++axis)
       origin[axis] = static_cast<float>(entry_[axis] + s * step_[axis] - (cell[axis] + 0.5));
+    const auto isBeyond = [&](int at) { return static_cast<uint32_t>(at) >= static_cast<uint32_t>(n_); };
     const bool inside =
         cell[0] > 0 && cell[1] > 0 && cell[2] > 0 && cell[0] < n_ - 1 && cell[1] < n_ - 1 && cell[2] < n_ - 1;
-    int slot = 0;
-    for (int k = -1; k <= 1; ++k) {
-      for (int j = -1; j <= 1; ++j) {
-        const int64_t row = cell[0] + int64_t{n_} * (cell[1] + j + int64_t{n_} * (cell[2] + k));
-        const float* const from = displacements_ + 3 * row;
-        for (int i = -1; i <= 1; ++i, ++slot) {
-          if (!inside && (static_cast<uint32_t>(cell[0] + i) >= static_cast<uint32_t>(n_) ||
-                          static_cast<uint32_t>(cell[1] + j) >= static_cast<uint32_t>(n_) ||
-                          static_cast<uint32_t>(cell[2] + k) >= static_cast<uint32_t>(n_))) {
-            sheared_[0][slot] = sheared_[1][slot] = sheared_[2][slot] = std::numeric_limits<float>::quiet_NaN();
-            continue;
-          }
-          const float at[3] = {static_cast<float>(i) + from[3 * i] - origin[0],
-                               static_cast<float>(j) + from[3 * i + 1] - origin[1],
-                               static_cast<float>(k) + from[3 * i + 2] - origin[2]};
-          sheared_[0][slot] = at[x_] - shearX * at[z_];
-          sheared_[1][slot] = at[y_] - shearY * at[z_];
-          sheared_[2][slot] = at[z_] * sign;
-        }
+    for (int row = 0; row < 9; ++row) {
+      const int y = cell[1] + row % 3 - 1, z = cell[2] + row / 3 - 1;
+      const float* const from = displacements_ + 3 * (cell[0] - 1 + int64_t{n_} * (y + int64_t{n_} * z));
+      float* const to = around_ + 9 * row;
+      if (inside) {
+        std::memcpy(to, from, 9 * sizeof(float));
+        continue;
       }
+      for (int i = 0; i < 3; ++i) {
+        const bool exists = !isBeyond(cell[0] - 1 + i) && !isBeyond(y) && !isBeyond(z);
+        for (int axis = 0; axis < 3; ++axis)
+          to[3 * i + axis] = exists ? from[3 * i + axis] : std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+    const Float d;
+    for (int slot = 0; slot < kSlots; slot += static_cast<int>(hn::Lanes(d))) {
+      Vector at[3];
+      hn::LoadInterleaved3(d, around_ + 3 * slot, at[0], at[1], at[2]);
+      for (int axis = 0; axis < 3; ++axis)
+        at[axis] = hn::Sub(hn::Add(hn::Load(d, kSlotOffsets.at[axis] + slot), at[axis]), hn::Set(d, origin[axis]));
+      hn::Store(hn::NegMulAdd(hn::Set(d, shearX), at[z_], at[x_]), d, sheared_[0] + slot);
+      hn::Store(hn::NegMulAdd(hn::Set(d, shearY), at[z_], at[y_]), d, sheared_[1] + slot);
+      hn::Store(hn::Mul(at[z_], hn::Set(d, sign)), d, sheared_[2] + slot);
     }
   }
 
@@ -350,7 +370,7 @@ class Walk {
   const uint32_t* keptFaces_;      // of all grids; null: all are
   int n_, x_ = 0, y_ = 1, z_ = 2;  // z_: the axis along which the ray is longest
   double near_, far_, entry_[3] = {}, step_[3] = {};
-  alignas(64) float sheared_[3][kSlots];
+  alignas(64) float around_[3 * kSlots], sheared_[3][kSlots];  // the vertices' displacements; see shear
 };
 
 void traceRay(const TraceOctahedra& a, uint32_t ray, std::vector<OctahedraHit>& hits) {
@@ -384,7 +404,8 @@ HWY_EXPORT(traceRay);
 
 namespace {
 
-constexpr size_t kRaysPerTask = 64;  // fixed; the hits of all tasks are concatenated in task order
+constexpr size_t kExpectedHits = 16;  // of a ray; more are only slower
+constexpr size_t kRaysPerTask = 64;   // fixed; the hits of all tasks are concatenated in task order
 
 // A face's vertices, and where they lie in their grid.
 struct FaceVertices {
@@ -449,6 +470,7 @@ void run(Context& context, const TraceOctahedra& a) {
   std::vector<std::vector<OctahedraHit>> hitsOfTask(tasks);
   context.pool.run(tasks, [&](size_t task, int) {
     std::vector<OctahedraHit>& hits = hitsOfTask[task];
+    hits.reserve(kRaysPerTask * kExpectedHits);
     for (size_t ray = task * kRaysPerTask; ray < std::min<size_t>(rays, (task + 1) * kRaysPerTask); ++ray) {
       const size_t before = hits.size();
       trace(a, static_cast<uint32_t>(ray), hits);

@@ -65,6 +65,20 @@ TEST(MeshTracer, FindsAllHitsWithTheirTexelsAndCompositesThem) {
   EXPECT_EQ(hits.size(), 1u) << "beside";
 }
 
+TEST(MeshContent, ChangesLittleByBlockCompression) {
+  MeshContent content = square();
+  content.patchEdge = 4;
+  content.texels.clear();
+  for (uint32_t i = 0; i < 16; ++i)
+    for (uint32_t number = 0; number < kMeshNumbers; ++number)
+      content.texels.push_back(static_cast<uint8_t>(40 + 7 * (i % 4) + 3 * (i / 4) + 10 * number));
+  const std::vector<uint8_t> before = content.texels;
+  passThroughBc4(content, Bc4Effort::fast);
+  EXPECT_NE(content.texels, before);
+  for (size_t i = 0; i < before.size(); ++i)
+    EXPECT_LE(std::abs(content.texels[i] - before[i]), 30 / 14 + 1) << "a fourteenth of each number's own range";
+}
+
 // The content of a trained cube looks as its model does.
 TEST(BakeMesh, LooksAsTheModelWithTheSameFaces) {
   const CubeScene scene;

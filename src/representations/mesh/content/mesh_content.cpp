@@ -35,6 +35,27 @@ MeshTexel mixTexels(const MeshContent& content, uint32_t patch, float column, fl
   return mixed;
 }
 
+void passThroughBc4(MeshContent& content, Bc4Effort effort) {
+  const uint32_t edge = content.patchEdge;
+  CHECK(edge % 4 == 0u);
+  for (uint32_t patch = 0; patch < content.patches(); ++patch) {
+    uint8_t* const texels = content.texels.data() + size_t{kMeshNumbers} * edge * edge * patch;
+    for (uint32_t number = 0; number < kMeshNumbers; ++number) {
+      for (uint32_t y = 0; y < edge; y += 4) {
+        for (uint32_t x = 0; x < edge; x += 4) {
+          const auto texel = [&](uint32_t i) -> uint8_t& {
+            return texels[size_t{kMeshNumbers} * (x + i % 4 + edge * (y + i / 4)) + number];
+          };
+          Bc4Texels block{};
+          for (uint32_t i = 0; i < block.size(); ++i) block[i] = texel(i);
+          const std::array<float, 16> decoded = decodeBc4(encodeBc4(block, effort));
+          for (uint32_t i = 0; i < block.size(); ++i) texel(i) = static_cast<uint8_t>(decoded[i] + 0.5f);
+        }
+      }
+    }
+  }
+}
+
 std::array<float, 3> decodeColour(const std::vector<DenseLayer>& decoder,
                                   const std::array<float, kMeshFeatures>& features,
                                   const std::array<float, 16>& harmonics) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "tiles/bc4.h"
 #include "tiles/dense_layer.h"
 
 namespace tessera {
@@ -44,6 +45,10 @@ struct MeshTexel {
 };
 // Mixes the texels of a patch at texel coordinates in [0, T-1].
 MeshTexel mixTexels(const MeshContent& content, uint32_t patch, float column, float row);
+
+// Replaces the texels by what remains of them after block compression of each of the nine numbers, rounded to 8 bits.
+// patchEdge is a multiple of 4.
+void passThroughBc4(MeshContent& content, Bc4Effort effort);
 
 // The colour of features seen along a direction, whose evaluateHarmonics() these are: the decoder's output through a
 // sigmoid.
