@@ -10,6 +10,7 @@
 #include "compute/octahedra.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
 #include <iterator>
@@ -86,6 +87,33 @@ inline const Candidates& selectCandidates(OctahedraPlacement placement, uint32_t
   if (placement == OctahedraPlacement::all) return every;
   return parity % 2 == 0 ? even : odd;
 }
+
+// Which blocks of 4³ cells hold an occupied cell, so that rays cross the others at once.
+class OccupiedBlocks {
+ public:
+  static constexpr int kEdge = 4;
+
+  OccupiedBlocks(OctahedraGrids grids, const uint32_t* occupancy)
+      : blocks_((grids[0].resolution + kEdge - 1) / kEdge),
+        isOccupied_(size_t{blocks_} * blocks_ * blocks_ * grids.size()) {
+    const uint32_t n = grids[0].resolution, words = grids[0].words();
+    for (size_t word = 0; word < words * grids.size(); ++word) {
+      for (uint32_t bits = occupancy[word]; bits != 0; bits &= bits - 1) {
+        const uint32_t cell = static_cast<uint32_t>(word % words) * 32 + static_cast<uint32_t>(std::countr_zero(bits));
+        const uint32_t at[3] = {cell % n / kEdge, cell / n % n / kEdge, cell / (n * n) / kEdge};
+        isOccupied_[word / words * blocks_ * blocks_ * blocks_ + at[0] + blocks_ * (at[1] + size_t{blocks_} * at[2])] =
+            1;
+      }
+    }
+  }
+  // Of one grid; block (i, j, k) at i + blocks() (j + blocks() k).
+  const uint8_t* inGrid(uint32_t grid) const { return isOccupied_.data() + size_t{grid} * blocks_ * blocks_ * blocks_; }
+  int blocks() const { return static_cast<int>(blocks_); }
+
+ private:
+  uint32_t blocks_;
+  std::vector<uint8_t> isOccupied_;
+};
 
 struct OctahedraHit {
   uint32_t ray, face;
@@ -184,8 +212,8 @@ struct Table {
 class Walk {
  public:
   // The ray gets hits at distances in (near, far). `first`: the first one of the ray in `hits`.
-  Walk(const TraceOctahedra& a, uint32_t grid, uint32_t ray, double near, double far, size_t first,
-       std::vector<OctahedraHit>& hits)
+  Walk(const TraceOctahedra& a, const OccupiedBlocks& blocks, uint32_t grid, uint32_t ray, double near, double far,
+       size_t first, std::vector<OctahedraHit>& hits)
       : a_(a),
         grid_(a.grids[grid]),
         firstCell_(grid * grid_.cells()),
@@ -195,7 +223,9 @@ class Walk {
         line_(grid_, hostPointer(a.origins) + 3 * size_t{ray}, hostPointer(a.directions) + 3 * size_t{ray}),
         displacements_(hostPointer(a.displacements) + size_t{3} * firstCell_),
         occupancy_(hostPointer(a.occupancy) + size_t{grid} * grid_.words()),
+        blocks_(blocks.inGrid(grid)),
         keptFaces_(hostPointer(a.keptFaces)),
+        blocksAlong_(blocks.blocks()),
         n_(static_cast<int>(grid_.resolution)),
         near_(near),
         far_(far) {
@@ -236,7 +266,37 @@ class Walk {
     };
     for (int axis = 0; axis < 3; ++axis) next[axis] = wall(axis);
     double s = 0;
+    constexpr int kEdge = OccupiedBlocks::kEdge;
     for (;;) {
+      const int block[3] = {cell[0] / kEdge, cell[1] / kEdge, cell[2] / kEdge};
+      if (blocks_[block[0] + blocksAlong_ * (block[1] + int64_t{blocksAlong_} * block[2])] == 0) {
+        // To the cell beyond the wall of the block. Along the other axes, rounding may choose the neighbour of a cell
+        // at its wall: the ray then leaves that cell where it entered it.
+        double leave = std::numeric_limits<double>::infinity();
+        int through = 0;
+        for (int axis = 0; axis < 3; ++axis) {
+          if (step_[axis] == 0) continue;
+          const double at = (kEdge * (block[axis] + (step_[axis] > 0 ? 1 : 0)) - entry_[axis]) / step_[axis];
+          if (at < leave) {
+            leave = at;
+            through = axis;
+          }
+        }
+        if (!(leave < last)) return true;
+        s = std::max(s, leave);
+        for (int axis = 0; axis < 3; ++axis) {
+          const int first = kEdge * block[axis];
+          if (axis == through) {
+            cell[axis] = step_[axis] > 0 ? first + kEdge : first - 1;
+            if (cell[axis] < 0 || cell[axis] >= n_) return true;
+          } else {
+            cell[axis] =
+                std::clamp(static_cast<int>(entry_[axis] + s * step_[axis]), first, std::min(first + kEdge, n_) - 1);
+          }
+        }
+        for (int axis = 0; axis < 3; ++axis) next[axis] = wall(axis);
+        continue;
+      }
       int axis = next[1] < next[0] ? 1 : 0;
       if (next[2] < next[axis]) axis = 2;
       const double leave = next[axis];
@@ -367,13 +427,14 @@ class Walk {
   HomogeneousRay line_;
   const float* displacements_;  // of the grid
   const uint32_t* occupancy_;
-  const uint32_t* keptFaces_;      // of all grids; null: all are
-  int n_, x_ = 0, y_ = 1, z_ = 2;  // z_: the axis along which the ray is longest
+  const uint8_t* blocks_;
+  const uint32_t* keptFaces_;                    // of all grids; null: all are
+  int blocksAlong_, n_, x_ = 0, y_ = 1, z_ = 2;  // z_: the axis along which the ray is longest
   double near_, far_, entry_[3] = {}, step_[3] = {};
   alignas(64) float around_[3 * kSlots], sheared_[3][kSlots];  // the vertices' displacements; see shear
 };
 
-void traceRay(const TraceOctahedra& a, uint32_t ray, std::vector<OctahedraHit>& hits) {
+void traceRay(const TraceOctahedra& a, const OccupiedBlocks& blocks, uint32_t ray, std::vector<OctahedraHit>& hits) {
   const float* const direction = hostPointer(a.directions) + 3 * size_t{ray};
   if (a.maximum == 0 || (direction[0] == 0 && direction[1] == 0 && direction[2] == 0)) return;
   const double near =
@@ -384,14 +445,14 @@ void traceRay(const TraceOctahedra& a, uint32_t ray, std::vector<OctahedraHit>& 
   std::array<std::pair<double, uint32_t>, kMaxOctahedraGrids> order;
   size_t count = 0;
   for (uint32_t grid = 0; grid < a.grids.size(); ++grid) {
-    const Walk walk(a, grid, ray, near, far, first, hits);
+    const Walk walk(a, blocks, grid, ray, near, far, first, hits);
     if (!walk.meetsGrid()) continue;
     size_t place = count++;
     for (; place > 0 && walk.near() < order[place - 1].first; --place) order[place] = order[place - 1];
     order[place] = {walk.near(), grid};
   }
   for (size_t i = 0; i < count; ++i)
-    if (!Walk(a, order[i].second, ray, near, far, first, hits).run()) return;
+    if (!Walk(a, blocks, order[i].second, ray, near, far, first, hits).run()) return;
 }
 
 }  // namespace tessera::cpu::HWY_NAMESPACE
@@ -465,6 +526,7 @@ void run(Context& context, const TraceOctahedra& a) {
   CHECK((a.grids.size() >= 1u && a.grids.size() <= kMaxOctahedraGrids));
   const uint32_t rays = hostCount(a.rays);
   const auto trace = HWY_DYNAMIC_DISPATCH(traceRay);
+  const OccupiedBlocks blocks(a.grids, hostPointer(a.occupancy));
   uint32_t* const firstSample = hostPointer(a.firstSample);
   const size_t tasks = (rays + kRaysPerTask - 1) / kRaysPerTask;
   std::vector<std::vector<OctahedraHit>> hitsOfTask(tasks);
@@ -473,7 +535,7 @@ void run(Context& context, const TraceOctahedra& a) {
     hits.reserve(kRaysPerTask * kExpectedHits);
     for (size_t ray = task * kRaysPerTask; ray < std::min<size_t>(rays, (task + 1) * kRaysPerTask); ++ray) {
       const size_t before = hits.size();
-      trace(a, static_cast<uint32_t>(ray), hits);
+      trace(a, blocks, static_cast<uint32_t>(ray), hits);
       firstSample[ray + 1] = static_cast<uint32_t>(hits.size() - before);
     }
   });
