@@ -106,6 +106,9 @@ bool trainCoarseField(Device& device, const Capture& capture, const fs::path& mo
   if (loop.resume) {
     coarse.photoBudgetMiB = savedConfig<FieldConfig>(folder.root()).photoBudgetMiB;
     requireSameConfig(folder.root(), coarse);
+    // A finished field stays as it is: parts were trained from it, and other processes may be reading it.
+    const ModelManifest manifest = requireManifest(folder, "field");
+    if (manifest.plannedSteps > 0 && manifest.step >= manifest.plannedSteps) return true;
   }
   return trainField(device, capture, folder.root(), {coarse, loop}).finished;
 }
