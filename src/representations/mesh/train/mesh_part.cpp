@@ -9,7 +9,7 @@
 
 namespace tessera {
 
-std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool outside) {
+std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool background) {
   const double height = (grid.top - grid.bottom) / 2;
   const SceneFrame whole = makeSceneFrame(grid);
   std::vector<MeshPart> parts;
@@ -23,7 +23,7 @@ std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool outside) {
     part.halfEdges = {1, 1, static_cast<float>(height * whole.scale)};
     parts.push_back(part);
   }
-  if (!outside) return parts;
+  if (!background) return parts;
   const Vec3d half = {grid.columns * grid.edge / 2, grid.rows * grid.edge / 2, height};
   MeshPart part;
   part.name = "background";

@@ -16,15 +16,15 @@ namespace tessera {
 // region of all blocks.
 struct MeshPart {
   std::string name;  // "block_0_0" (column, row), "background": its folder in the model's folder `parts`
-  int block = -1;    // number in the grid of blocks; -1: the outside
+  int block = -1;    // number in the grid of blocks; -1: the background block
   SceneFrame frame;
   std::array<float, 3> halfEdges{};  // of the block, or of the region that it lies outside of
 
   bool isBackground() const { return block < 0; }
 };
 
-// Returns the blocks of a grid, row by row, and the outside, if requested.
-std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool outside);
+// Returns the blocks of a grid, row by row, and the background block, if requested.
+std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool background);
 
 // The octahedra of one level of detail of a part. Positions in its field are those of a lattice of cells that all grids
 // share; an occupancy refers to the cells of this lattice.

@@ -15,8 +15,8 @@ constexpr uint32_t kCapacityPerDemand = 2;                // for steps that need
 constexpr uint32_t kMaxTrainingHits = 256;                // of a ray
 constexpr uint32_t kLosses = 2 * PhotoLoss::kLosses + 2;  // of a level: of both images, distortion, depth
 constexpr uint32_t kRaysPerCoarseRay = 4;
-// Of these updates of the occupancy, one is followed by hits in the neighbours of occupied cells, too. They are most
-// hits, and nearly all of them are transparent.
+// After one of this many updates of the occupancy, the neighbours of occupied cells are traced, too. Most hits would be
+// in them, and nearly all of these are transparent.
 constexpr int64_t kUpdatesPerExploration = 8;
 constexpr float kMinTrainingTransmittance = 1e-4f;
 constexpr double kFinalVertexFactor = 0.01;
