@@ -65,6 +65,25 @@ struct NumberLossArguments {
 };
 TESSERA_SIZE(NumberLossArguments, 64);
 
+struct DitherLossArguments {
+  CountArguments rays;
+  FloatPointer rayWeights;  // optional
+  UintPointer firstSample;
+  FloatPointer weights;
+  MatrixArguments colours;
+  FloatPointer colour;
+  FloatPointer opacity;
+  FloatPointer background;  // optional
+  FloatPointer partials;    // [workgroups]
+  FloatPointer weightGradients;
+  MatrixArguments colourGradients;
+  FloatPointer rayColourGradients;
+  FloatPointer rayOpacityGradients;  // with a background
+  float scale;
+  uint unused;
+};
+TESSERA_SIZE(DitherLossArguments, 160);
+
 struct ExposureArguments {
   CountArguments rays;
   FloatPointer colours;

@@ -105,4 +105,27 @@ struct SparsityLoss {
 };
 TESSERA_OPERATION(SparsityLoss);
 
+// The expected squared error of a renderer that draws layers of triangles without sorting them: for each pixel it shows
+// layer i with probability w_i (dithering), so that averages over pixels are right, and pixels are noisy.
+// loss = scale · Σ_rays rayWeight · (Σ_i w_i |c_i|² + (1 - opacity) |background|² - |colour|²), the variance of what a
+// pixel shows. Weights, colours of samples, colours of rays and opacities count as independent variables:
+// CompositeBackward takes the gradients on to what they are computed from.
+struct DitherLoss {
+  float scale = 1;
+  Count rays;
+  Slice<const float> rayWeights;      // optional, [rays]: 0 excludes a ray (masks)
+  Slice<const uint32_t> firstSample;  // [rays + 1]
+  Slice<const float> weights;         // [samples]
+  Matrix<const float> colours;        // [samples], 3 columns
+  Slice<const float> colour;          // [rays][3], from CompositeForward; includes (1 - opacity) · background
+  Slice<const float> opacity;         // [rays]; read only with a background
+  Slice<const float> background;      // optional, [rays][3]; black if absent
+  Slice<float> loss;                  // [1], overwritten
+  Slice<float> weightGradients;       // [samples], overwritten
+  Matrix<float> colourGradients;      // [samples], 3 columns, added to
+  Slice<float> rayColourGradients;    // [rays][3], added to
+  Slice<float> rayOpacityGradients;   // [rays], added to; required only with a background
+};
+TESSERA_OPERATION(DitherLoss);
+
 }  // namespace tessera

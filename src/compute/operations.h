@@ -19,6 +19,7 @@
 #include "compute/occupancy.h"
 #include "compute/octahedra.h"
 #include "compute/operation.h"
+#include "compute/patches.h"
 #include "compute/proposals.h"
 #include "compute/rays.h"
 #include "compute/rows.h"
@@ -83,6 +84,13 @@ namespace tessera {
   X(ExposureBackward)           \
   X(CubeMapForward)             \
   X(CubeMapBackward)            \
+  X(PatchTexels)                \
+  X(DistinctRows)               \
+  X(StoreTexelsForward)         \
+  X(StoreTexelsBackward)        \
+  X(MixRowsForward)             \
+  X(MixRowsBackward)            \
+  X(DitherLoss)                 \
   X(Adam)
 
 inline constexpr OperationId kAllOperations[] = {

@@ -167,6 +167,7 @@ Roofline measureRoofline(const RooflineOptions& options) {
   measureVirtualGrid(recorder);
   measureAttention(recorder);
   measureOctahedra(recorder);
+  measurePatches(recorder);
   measureParameterStreams(recorder);
   result.rows = recorder.takeRows();
   return result;

@@ -59,6 +59,7 @@ void measureBlockStreams(RooflineRecorder& recorder);   // sampling through bloc
 void measureVirtualGrid(RooflineRecorder& recorder);
 void measureAttention(RooflineRecorder& recorder);  // marching in blocks, lattice, fusing levels, shading
 void measureOctahedra(RooflineRecorder& recorder);
+void measurePatches(RooflineRecorder& recorder);
 void measureParameterStreams(RooflineRecorder& recorder);  // losses, exposure, occupancy, Adam
 
 }  // namespace tessera

@@ -192,6 +192,26 @@ void measureCompositing(RooflineRecorder& recorder, Lines& lines) {
       });
 }
 
+void measureDitherLoss(RooflineRecorder& recorder, Lines& lines) {
+  Device& device = recorder.device();
+  const std::string shape = fmt::format("{}, {} a ray", describeShape(lines.samples, "samples"), kLine);
+  Array<float> loss = device.array<float>(1), weightGradients = device.array<float>(lines.samples);
+  Array<float> colourGradients = device.array<float>(size_t{lines.samples} * 3),
+               rayColourGradients = device.array<float>(size_t{lines.rays} * 3);
+  DitherLoss dither;
+  dither.rays = {lines.rays, {}};
+  dither.firstSample = lines.firstSample;
+  dither.weights = lines.steps;
+  dither.colours = Matrix<float>(lines.colours, 3);
+  dither.colour = lines.perRay;
+  dither.loss = loss;
+  dither.weightGradients = weightGradients;
+  dither.colourGradients = Matrix<float>(colourGradients, 3);
+  dither.rayColourGradients = rayColourGradients;
+  recorder.measureStream(kOperation<DitherLoss>, shape, lines.samples * 44.0 + lines.rays * 40.0,
+                         [&] { device.run(dither); });
+}
+
 // Measures blending with two segments per ray.
 void measureBlending(RooflineRecorder& recorder, uint32_t segments) {
   Device& device = recorder.device();
@@ -392,6 +412,7 @@ void measureSampleStreams(RooflineRecorder& recorder) {
   Lines lines(recorder, recorder.options().streamed);
   measureEncodings(recorder, lines);
   measureCompositing(recorder, lines);
+  measureDitherLoss(recorder, lines);
   measureBlending(recorder, recorder.options().streamed / 8);
   measureRays(recorder, recorder.options().streamed);
   measureCubeMap(recorder, recorder.options().streamed);

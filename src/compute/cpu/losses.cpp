@@ -271,4 +271,44 @@ void run(Context& context, const SparsityLoss& a) {
   *hostPointer(a.loss) = static_cast<float>(a.scale * loss);
 }
 
+void run(Context& context, const DitherLoss& a) {
+  CHECK(a.colours.columns == 3u);
+  CHECK(a.colourGradients.columns == 3u);
+  const uint32_t* firstSample = hostPointer(a.firstSample);
+  const float* rayWeights = hostPointer(a.rayWeights);
+  const float* weights = hostPointer(a.weights);
+  const float* colours = hostPointer(a.colours.data);
+  const float* colour = hostPointer(a.colour);
+  const float* background = hostPointer(a.background);
+  float* weightGradients = hostPointer(a.weightGradients);
+  float* colourGradients = hostPointer(a.colourGradients.data);
+  float* rayColourGradients = hostPointer(a.rayColourGradients);
+  const double loss = sumInOrder(context.pool, hostCount(a.rays), [&](size_t ray) {
+    const float rayWeight = rayWeights ? rayWeights[ray] : 1, scale = a.scale * rayWeight;
+    double sum = 0;
+    for (uint32_t i = firstSample[ray]; i < firstSample[ray + 1]; ++i) {
+      float square = 0;
+      for (uint32_t c = 0; c < 3; ++c) {
+        const float value = colours[a.colours.offset(i, c)];
+        square += value * value;
+        colourGradients[a.colourGradients.offset(i, c)] += 2 * scale * weights[i] * value;
+      }
+      sum += static_cast<double>(weights[i]) * square;
+      weightGradients[i] = scale * square;
+    }
+    float squareBehind = 0;
+    for (size_t i = 3 * ray; i < 3 * ray + 3; ++i) {
+      sum -= static_cast<double>(colour[i]) * colour[i];
+      rayColourGradients[i] -= 2 * scale * colour[i];
+      if (background) squareBehind += background[i] * background[i];
+    }
+    if (background) {
+      sum += (1 - static_cast<double>(hostPointer(a.opacity)[ray])) * squareBehind;
+      hostPointer(a.rayOpacityGradients)[ray] -= scale * squareBehind;
+    }
+    return rayWeight * sum;
+  });
+  *hostPointer(a.loss) = static_cast<float>(a.scale * loss);
+}
+
 }  // namespace tessera::cpu

@@ -8,14 +8,13 @@
 #include "compute/virtual_grid.h"
 
 #include <algorithm>
-#include <atomic>
-#include <bit>
 #include <cmath>
 #include <cstring>
 #include <utility>
 #include <vector>
 
 #include "compute/cpu/kernels.h"
+#include "compute/cpu/ranked_marks.h"
 #include "compute/cpu/virtual_texels.h"
 #include "compute/host_memory.h"
 
@@ -280,24 +279,19 @@ HWY_EXPORT(backwardSource);
 
 namespace {
 
-constexpr size_t kSamplesPerTask = 2048, kWordsPerTask = 8192, kRowsPerTask = 16384;
+constexpr size_t kSamplesPerTask = 2048, kRowsPerTask = 16384;
 
 void markSamples(const DistinctTexels& a, size_t begin, size_t end) {
   const uint32_t* blocks = hostPointer(a.blockOfSample);
   const float* positions = hostPointer(a.positions);
   uint32_t* marks = hostPointer(a.marks);
   const size_t words = a.grid.words();
-  const auto mark = [&](uint32_t* ofBlock, uint32_t texel) {
-    std::atomic_ref<uint32_t> word(ofBlock[texel / 32]);
-    const uint32_t bit = 1u << texel % 32;
-    if (!(word.load(std::memory_order_relaxed) & bit)) word.fetch_or(bit, std::memory_order_relaxed);
-  };
   for (size_t s = begin; s < end; ++s) {
     uint32_t* ofBlock = marks + blocks[s] * words;
     for (uint32_t source = 0; source < a.grid.sources(); ++source) {
       SourceCorners corners;
       sourceCorners(a.grid, source, positions + 3 * s, corners);
-      for (uint32_t k = 0; k < cornersOfSource(source); ++k) mark(ofBlock, corners.texel[k]);
+      for (uint32_t k = 0; k < cornersOfSource(source); ++k) setMark(ofBlock, corners.texel[k]);
     }
   }
 }
@@ -336,29 +330,13 @@ void run(Context& context, const DistinctTexels& a) {
   }
   uint32_t* marks = hostPointer(a.marks);
   uint32_t* ranks = hostPointer(a.ranks);
-  context.pool.forRanges(all, kWordsPerTask,
-                         [&](size_t begin, size_t end) { std::fill(marks + begin, marks + end, 0u); });
+  clearMarks(context.pool, marks, all);
   context.pool.forRanges(samples, kSamplesPerTask, [&](size_t begin, size_t end) { markSamples(a, begin, end); });
-  // The number of bits in each range of words, then in all ranges before it.
-  std::vector<uint32_t> before((all + kWordsPerTask - 1) / kWordsPerTask + 1);
-  context.pool.forRanges(all, kWordsPerTask, [&](size_t begin, size_t end) {
-    uint32_t bits = 0;
-    for (size_t word = begin; word < end; ++word) bits += static_cast<uint32_t>(std::popcount(marks[word]));
-    before[begin / kWordsPerTask + 1] = bits;
-  });
-  for (size_t piece = 1; piece < before.size(); ++piece) before[piece] += before[piece - 1];
-  context.pool.forRanges(all, kWordsPerTask, [&](size_t begin, size_t end) {
-    uint32_t next = before[begin / kWordsPerTask];
-    for (size_t word = begin; word < end; ++word) {
-      ranks[word] = next;
-      const uint32_t firstTexel = static_cast<uint32_t>(word % words * 32);
-      for (uint32_t bits = marks[word]; bits != 0; bits &= bits - 1) {
-        placeTexel(a, next++, firstTexel + static_cast<uint32_t>(std::countr_zero(bits)));
-      }
-    }
+  const uint32_t texels = rankMarks(context.pool, marks, ranks, all, [&](uint32_t row, size_t bit) {
+    placeTexel(a, row, static_cast<uint32_t>(bit % (32 * words)));
   });
   for (uint32_t block = 0; block < a.blocks; ++block) first[block] = ranks[block * words];
-  first[a.blocks] = before.back();
+  first[a.blocks] = texels;
 }
 
 void run(Context& context, const VirtualGridForward& a) {

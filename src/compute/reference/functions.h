@@ -21,6 +21,7 @@ struct MarchSpace;
 struct MlpShape;
 struct OctahedraGrid;
 struct RayCamera;
+struct StoreTexelsForward;
 struct VirtualGrid;
 enum class ColourLossKind;
 enum class Extinction;
@@ -216,6 +217,17 @@ double quantised(const VirtualGrid& grid, double attribute);
 // Log density, 3 diffuse colours and 4 features of a sample whose corners have the (quantised) `attributes`,
 // [corners][8].
 Doubles virtualSample(const VirtualGrid& grid, std::span<const VirtualCorner> corners, View attributes);
+// patches.cpp
+struct PatchTexel {
+  uint32_t number = 0;
+  double weight = 0;
+};
+// The four texels around a hit, of PatchTexels. `place` is that of the face, `barycentrics` are those of its vertices,
+// and `factors` those of the corners of the patch, or empty.
+std::array<PatchTexel, 4> patchTexels(uint32_t patchEdge, uint32_t place, const Point& barycentrics, View factors);
+// One row of StoreTexelsForward. Without `rounds`, features are only limited to their ranges and opacities are those of
+// the logit: the function whose gradient StoreTexelsBackward computes.
+Doubles storedTexel(const StoreTexelsForward& options, View ranges, View features, bool rounds = true);
 // attention.cpp: one sample; its log density is not clamped
 Doubles fusedFeatures(const AttentionShape& shape, View coarse, View fine, View logits);
 Point shadedColour(const double diffuse[3], const double specular[3], double opacity);
@@ -261,6 +273,8 @@ LossAndGradients ssimOfGroup(const double x[16], const double y[16]);
 LossAndGradients s3imLoss(View predicted, View target, View weights, uint32_t patches, uint64_t seed);
 ValueAndSlope opacityLoss(double opacity);
 ValueAndSlope sparsityLoss(double logDensity, double runtimeStep);
+// One ray of DitherLoss, unscaled; colours are [n][3].
+double ditherLossOfRay(View weights, View colours, const Point& colour, double opacity, const Point& background);
 
 // adam.cpp
 struct AdamState {

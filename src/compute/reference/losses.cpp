@@ -143,6 +143,13 @@ ValueAndSlope sparsityLoss(double logDensity, double runtimeStep) {
           std::exp(-opticalDepth) * runtimeStep * std::exp(std::clamp(logDensity, -15.0, 15.0))};
 }
 
+double ditherLossOfRay(View weights, View colours, const Point& colour, double opacity, const Point& background) {
+  double loss = 0;
+  for (size_t i = 0; i < colours.size(); ++i) loss += weights[i / 3] * colours[i] * colours[i];
+  for (size_t c = 0; c < 3; ++c) loss += (1 - opacity) * background[c] * background[c] - colour[c] * colour[c];
+  return loss;
+}
+
 void run(const ColourLoss& a) {
   const size_t rays = hostCount(a.rays);
   const Doubles predicted = doubles(a.predicted, 3 * rays), target = doubles(a.target, 3 * rays);
@@ -227,6 +234,42 @@ void run(const SparsityLoss& a) {
   }
   store(a.loss, loss);
   store(a.gradients, gradients);
+}
+
+void run(const DitherLoss& a) {
+  const size_t rays = hostCount(a.rays);
+  const Indices firstSample = indices(a.firstSample, rays + 1);
+  const size_t samples = firstSample[rays];
+  CHECK(a.colours.columns == 3u);
+  CHECK(a.colourGradients.columns == 3u);
+  const Doubles weights = doubles(a.weights, samples), colours = doubles(a.colours, samples);
+  const Doubles rayWeights = doubles(a.rayWeights, rays), colour = doubles(a.colour, 3 * rays);
+  const Doubles background = doubles(a.background, 3 * rays);
+  const Doubles opacity = background.empty() ? Doubles() : doubles(a.opacity, rays);
+  Doubles loss(1), weightGradients(samples), rayColourGradients(3 * rays), rayOpacityGradients(rays);
+  Doubles colourGradients = doubles(Matrix<const float>(a.colourGradients), samples);
+  for (size_t r = 0; r < rays; ++r) {
+    const double scale = a.scale * (rayWeights.empty() ? 1 : rayWeights[r]);
+    const size_t first = firstSample[r], count = firstSample[r + 1] - first;
+    const Point of = {colour[3 * r], colour[3 * r + 1], colour[3 * r + 2]};
+    Point behind{};
+    if (!background.empty()) behind = {background[3 * r], background[3 * r + 1], background[3 * r + 2]};
+    loss[0] += scale * ditherLossOfRay(View(weights).subspan(first, count), View(colours).subspan(3 * first, 3 * count),
+                                       of, opacity.empty() ? 0 : opacity[r], behind);
+    for (size_t i = 3 * first; i < 3 * (first + count); ++i) {
+      weightGradients[i / 3] += scale * colours[i] * colours[i];
+      colourGradients[i] += 2 * scale * weights[i / 3] * colours[i];
+    }
+    for (size_t c = 0; c < 3; ++c) {
+      rayColourGradients[3 * r + c] = -2 * scale * of[c];
+      rayOpacityGradients[r] -= scale * behind[c] * behind[c];
+    }
+  }
+  store(a.loss, loss);
+  store(a.weightGradients, weightGradients);
+  store(a.colourGradients, colourGradients);
+  add(a.rayColourGradients, rayColourGradients);
+  if (a.background) add(a.rayOpacityGradients, rayOpacityGradients);
 }
 
 }  // namespace tessera::reference

@@ -8,6 +8,8 @@
 #include "shaders/depth_loss_subgroups.h"
 #include "shaders/distortion_loss.h"
 #include "shaders/distortion_loss_subgroups.h"
+#include "shaders/dither_loss.h"
+#include "shaders/dither_loss_subgroups.h"
 #include "shaders/opacity_loss.h"
 #include "shaders/opacity_loss_subgroups.h"
 #include "shaders/s3im_loss.h"
@@ -117,6 +119,28 @@ void VulkanDevice::enqueue(const SparsityLoss& options) {
   arguments.gradients = deviceAddress(options.gradients);
   queueSums(kernel(groupSpirv(kSparsityLossSubgroupsSpirv, kSparsityLossSpirv)), arguments,
             atLeastOneGroup(options.points.capacity, kSummedPerGroup), 1, deviceAddress(options.loss));
+}
+
+template <>
+void VulkanDevice::enqueue(const DitherLoss& options) {
+  CHECK(options.colours.columns == 3u);
+  CHECK(options.colourGradients.columns == 3u);
+  arguments::DitherLossArguments arguments = {};
+  arguments.rays = countArguments(options.rays);
+  arguments.rayWeights = deviceAddress(options.rayWeights);
+  arguments.firstSample = deviceAddress(options.firstSample);
+  arguments.weights = deviceAddress(options.weights);
+  arguments.colours = matrixArguments(options.colours, 0);
+  arguments.colour = deviceAddress(options.colour);
+  arguments.opacity = deviceAddress(options.opacity);
+  arguments.background = deviceAddress(options.background);
+  arguments.weightGradients = deviceAddress(options.weightGradients);
+  arguments.colourGradients = matrixArguments(options.colourGradients, 0);
+  arguments.rayColourGradients = deviceAddress(options.rayColourGradients);
+  arguments.rayOpacityGradients = deviceAddress(options.rayOpacityGradients);
+  arguments.scale = options.scale;
+  queueSums(kernel(groupSpirv(kDitherLossSubgroupsSpirv, kDitherLossSpirv)), arguments,
+            atLeastOneGroup(options.rays.capacity, kSummedPerGroup), 1, deviceAddress(options.loss));
 }
 
 }  // namespace tessera
