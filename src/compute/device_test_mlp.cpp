@@ -79,6 +79,22 @@ OperationTests makeTests<MlpForward>() {
                    keep ? stage.keptOutput("activations", size.capacity * shape.activationsPerSample())
                         : Slice<float>()});
              }});
+  tests.cases.push_back(
+      {"sigmoids far from zero", [](Stage& stage) {
+         // Every layer takes means of the inputs; the last one changes the sign of every other.
+         const MlpShape shape = networks()[1].shape;
+         constexpr size_t kSamples = 200;
+         std::vector<float> weights;
+         for (int l = 0; l < shape.layers(); ++l)
+           for (int o = 0; o < shape.layerOutputs(l); ++o)
+             weights.insert(
+                 weights.end(), static_cast<size_t>(shape.layerInputs(l)),
+                 (l == shape.hiddenLayers && o % 2 == 0 ? -1.0f : 1.0f) / static_cast<float>(shape.layerInputs(l)));
+         stage.device.run(
+             MlpForward{shape, Count{kSamples, {}},
+                        stage.randomMatrix(kSamples, shape.inputs, Layout::strided, 100, 2000), stage.input(weights),
+                        stage.outputMatrix("output", kSamples, shape.outputs, Layout::plain), Slice<float>()});
+       }});
   return tests;
 }
 

@@ -133,7 +133,8 @@ HWY_INLINE void throughNetwork(const UnitRows& network, Activations& a) {
     for (int i = 1; i < kVectors; ++i) sum = hn::MulAdd(row.v[i], second.v[i], sum);
     a.output[c] = hn::GetLane(hn::SumOfLanes(d, sum)) + network.third[3][c];
   }
-  const Vector one = hn::Set(d, 1.0f), x = hn::Load(d, a.output);
+  const Vector one = hn::Set(d, 1.0f),
+               x = hn::Max(hn::Load(d, a.output), hn::Set(d, -80.0f));  // Exp is not defined beyond this
   hn::Store(hn::Div(one, hn::Add(one, hn::Exp(d, hn::Neg(x)))), d, a.output);
 }
 

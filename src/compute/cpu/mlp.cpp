@@ -129,7 +129,7 @@ void sigmoidRow(float* row, int columns) {
   const Float d;
   const Vector one = hn::Set(d, 1.0f);
   for (int i = 0; i < columns; i += static_cast<int>(hn::Lanes(d))) {
-    const Vector x = hn::LoadU(d, row + i);
+    const Vector x = hn::Max(hn::LoadU(d, row + i), hn::Set(d, -80.0f));  // Exp is not defined beyond this
     hn::StoreU(hn::Div(one, hn::Add(one, hn::Exp(d, hn::Neg(x)))), d, row + i);
   }
 }
