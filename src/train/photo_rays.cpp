@@ -52,10 +52,11 @@ PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& f
     *three = device.array<float>(3 * rays);
 }
 
-void PhotoRays::draw(int64_t step, uint32_t rays) {
+void PhotoRays::draw(int64_t step, uint32_t rays, uint32_t square) {
   CHECK(rays <= settings_.maxRays);
   drawRays(photos_.at(step), known_,
-           {settings_.seed, settings_.randomBackground, settings_.sparseDepthRayFraction, tiles_ ? &*tiles_ : nullptr},
+           {settings_.seed, settings_.randomBackground, settings_.sparseDepthRayFraction, tiles_ ? &*tiles_ : nullptr,
+            square},
            step, rays, pool_, batch_);
   count_ = rays;
   device_.write(photoOfRay_.all(), std::span<const uint32_t>(batch_.photoOfRay));

@@ -33,7 +33,8 @@ class PhotoRays {
 
   // Draws the rays of a step: a function of the seed, the step, the number of rays, and the tiles that they are drawn
   // from. Without a call of drawFrom they are drawn from whole photos.
-  void draw(int64_t step, uint32_t rays);
+  // With `square` above 1 they are squares of so many neighbouring pixels along an edge (RayBatchOptions).
+  void draw(int64_t step, uint32_t rays, uint32_t square = 1);
   void drawFrom(std::vector<TileShares> tiles) { tiles_ = std::move(tiles); }  // [photo]
 
   const RayBatch& batch() const { return batch_; }

@@ -70,13 +70,16 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
   if (options.tiles) tiles.emplace(window, *options.tiles);
   const bool nothing = tiles && tiles->isEmpty();
   const RandomStream random(options.seed, 0x4a75 + (static_cast<uint64_t>(step) << 16));
+  const size_t pixelsOfSquare = size_t{options.square} * options.square;
   const auto drawRay = [&](size_t ray) {
     uint64_t draw = kDrawsPerRay * ray;
+    const uint32_t inSquare = static_cast<uint32_t>(ray % pixelsOfSquare);
     batch.jitter[ray] = random.uniform(draw++);
     float* background = &batch.backgrounds[3 * ray];
     for (int k = 0; k < 3; ++k) background[k] = options.randomBackground ? random.uniform(draw + k) : 0.0f;
     draw += 3;
-    const bool wantsKnown = random.uniform(draw++) < options.sparseDepthRayFraction;
+    const bool wantsKnown = options.square == 1 && random.uniform(draw) < options.sparseDepthRayFraction;
+    draw = kDrawsPerRay * (ray - inSquare) + 5;  // all rays of a square use the same numbers
     for (int attempt = 0; attempt < kTries; ++attempt) {
       const PhotoTile* tile = nullptr;
       size_t chosenEntry = 0;
@@ -92,8 +95,11 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       const uint32_t left = tile ? tile->left : 0, top = tile ? tile->top : 0;
       const uint32_t right = tile ? tile->right : static_cast<uint32_t>(image.width);
       const uint32_t bottom = tile ? tile->bottom : static_cast<uint32_t>(image.height);
-      uint32_t x = left + random.below(draw++, right - left);
-      uint32_t y = top + random.below(draw++, bottom - top);
+      const uint32_t column = inSquare % options.square, row = inSquare / options.square;
+      uint32_t x = left + random.below(draw++, std::max(right - left, options.square) - options.square + 1) + column;
+      uint32_t y = top + random.below(draw++, std::max(bottom - top, options.square) - options.square + 1) + row;
+      x = std::min(x, right - 1);  // of tiles that are smaller than a square
+      y = std::min(y, bottom - 1);
       batch.distances[ray] = 0;
       const bool someKnown = wantsKnown && !nothing && !known.empty() && !known[entry.photo].empty();
       for (int pick = 0; someKnown && pick < kPicks; ++pick) {
@@ -110,7 +116,7 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       const bool masked =
           !entry.decoded->mask.empty() && *entry.decoded->mask.at(static_cast<int>(x), static_cast<int>(y)) < 128;
       batch.weights[ray] = masked || nothing ? 0.0f : 1.0f;
-      if (masked && attempt + 1 < kTries) continue;
+      if (masked && options.square == 1 && attempt + 1 < kTries) continue;
       batch.photoOfRay[ray] = static_cast<uint32_t>(entry.photo);
       batch.pixels[2 * ray] = static_cast<float>(x) + 0.5f;
       batch.pixels[2 * ray + 1] = static_cast<float>(y) + 0.5f;
