@@ -22,13 +22,24 @@
 namespace tessera {
 namespace {
 
-// Traces the contents of all parts: those of the blocks together, behind them that of the background block and the sky.
-class ContentsRenderer final : public ViewRenderer {
+// Traces the patches of all parts: those of the blocks together, behind them those of the background block and the sky.
+class PatchesRenderer final : public ViewRenderer, private HitShading {
  public:
-  ContentsRenderer(TrainedMesh& mesh, const std::vector<MeshContent>& contents) : mesh_(mesh) {
-    for (const MeshContent& content : contents) tracers_.emplace_back(content);
-    for (const auto& part : mesh.parts)
-      if (part->part().isBackground()) sky_ = mesh.device->read(part->sky().values.all());
+  PatchesRenderer(TrainedMesh& mesh, const std::vector<BakedPatches>& patches) : mesh_(mesh), patches_(patches) {
+    for (const BakedPatches& part : patches) {
+      PatchTriangles triangles;
+      triangles.pairs = part.pairs;
+      triangles.vertices.assign(part.vertices.begin(), part.vertices.end());
+      tracers_.emplace_back(std::span(&triangles, 1));
+      decoders_.emplace_back(part.decoder, kMeshFeatures + kMeshHarmonics, 3);
+    }
+    for (const auto& part : mesh.parts) {
+      if (!part->part().isBackground()) continue;
+      sky_.isBackground = true;
+      sky_.skyEdge = MeshModel::kSkyResolution;
+      for (const float number : mesh.device->read(part->sky().values.all()))
+        sky_.sky.push_back(FeatureRange{0, 1}.encode(number));
+    }
   }
 
   RenderedView render(const Camera& camera, const Pose& pose, const ImageF*) override {
@@ -40,7 +51,7 @@ class ContentsRenderer final : public ViewRenderer {
         if (!inCamera) continue;
         const CompositedRay ray = trace(pose.translation, (pose.rotation * *inCamera).normalized());
         for (int c = 0; c < 3; ++c) view.colour.at(x, y)[c] = ray.colour[c];
-        *view.opacity.at(x, y) = ray.opacity;
+        *view.opacity.at(x, y) = 1 - ray.transmittance;
         *view.depth.at(x, y) = ray.depth * static_cast<float>(inCamera->normalized().z());
       }
     });
@@ -49,30 +60,41 @@ class ContentsRenderer final : public ViewRenderer {
   std::string device() const override { return "Embree"; }
 
  private:
+  MeshTexel texel(const MeshHit& hit) const override {
+    const BakedPatches& part = patches_[hit.content];
+    const float last = static_cast<float>(part.patchEdge - 1);
+    return mixTexels(part, hit.patch, hit.column * last, hit.row * last);
+  }
+  const DenseNetwork& decoder(const MeshHit& hit) const override { return decoders_[hit.content]; }
+
   CompositedRay trace(const Vec3d& eye, const Vec3d& towards) const {
-    std::vector<MeshTracer::Hit> hits, behind;
-    Vec3f direction = Vec3f::Zero();
-    for (size_t i = 0; i < tracers_.size(); ++i) {
+    std::vector<MeshHit> hits, behind;
+    Vec3d direction = Vec3d::Zero();
+    for (uint32_t i = 0; i < tracers_.size(); ++i) {
       const MeshModel& model = *mesh_.parts[i];
       const SceneFrame& frame = model.frame();
-      const Vec3d origin = frame.sceneFromWorld(eye), along = frame.rotation * towards;
-      direction = along.cast<float>();
+      const Vec3d origin = frame.sceneFromWorld(eye);
+      direction = frame.rotation * towards;
       const bool isBackground = model.part().isBackground();
-      const double near = isBackground ? distanceBehind(origin, along, model.part().halfEdges) : model.config().near;
-      std::vector<MeshTracer::Hit>& to = isBackground ? behind : hits;
+      const double near =
+          isBackground ? distanceBehind(origin, direction, model.part().halfEdges) : model.config().near;
+      std::vector<MeshHit>& to = isBackground ? behind : hits;
       const size_t first = to.size();
-      tracers_[i].addHits(origin.cast<float>(), direction, static_cast<float>(near), 1e6f, to);
-      for (size_t h = first; h < to.size(); ++h) to[h].distance /= static_cast<float>(frame.scale);
+      tracers_[i].addHits(origin.cast<float>(), direction.cast<float>(), static_cast<float>(near), 1e6f, to);
+      for (size_t h = first; h < to.size(); ++h) {
+        to[h].distance /= static_cast<float>(frame.scale);
+        to[h].content = i;
+      }
     }
     constexpr float kMinTransmittance = 1e-3f;
-    CompositedRay ray = compositeHits(hits, direction, kMinTransmittance);
-    if (sky_.empty()) return ray;
-    const CompositedRay outside = compositeHits(behind, direction, kMinTransmittance);
-    const std::array<float, 3> sky = skyColour(direction);
-    const float share = 1 - ray.opacity;
-    for (int c = 0; c < 3; ++c) ray.colour[c] += share * (outside.colour[c] + (1 - outside.opacity) * sky[c]);
-    ray.depth += share * outside.depth / std::max(1e-6f, outside.opacity);
-    ray.opacity = 1;
+    CompositedRay ray;
+    compositeHits(hits, direction, kMinTransmittance, *this, ray);
+    compositeHits(behind, direction, kMinTransmittance, *this, ray);
+    if (sky_.skyEdge == 0) return ray;
+    const std::array<float, 3> sky = skyColour(sky_, direction);
+    for (int c = 0; c < 3; ++c) ray.colour[c] += ray.transmittance * sky[c];
+    ray.depth /= std::max(1e-6f, 1 - ray.transmittance);
+    ray.transmittance = 0;
     return ray;
   }
   static double distanceBehind(const Vec3d& origin, const Vec3d& direction, const std::array<float, 3>& halfEdges) {
@@ -85,32 +107,12 @@ class ContentsRenderer final : public ViewRenderer {
     }
     return enter < leave ? leave : 0;
   }
-  // CubeMapForward.
-  std::array<float, 3> skyColour(const Vec3f& direction) const {
-    constexpr uint32_t kSize = MeshModel::kSkyResolution;
-    int axis = 0;
-    direction.cwiseAbs().maxCoeff(&axis);
-    const float length = std::abs(direction[axis]);
-    const auto place = [&](int other) {
-      return std::clamp((direction[other] / length + 1) / 2, 0.0f, 1.0f) * (kSize - 1);
-    };
-    const float column = place((axis + 1) % 3), row = place((axis + 2) % 3);
-    const uint32_t x = std::min(static_cast<uint32_t>(column), kSize - 2),
-                   y = std::min(static_cast<uint32_t>(row), kSize - 2);
-    const size_t side = static_cast<size_t>(2 * axis + (direction[axis] < 0 ? 1 : 0));
-    std::array<float, 3> colour{};
-    for (uint32_t corner = 0; corner < 4; ++corner) {
-      const uint32_t dx = corner & 1, dy = corner >> 1;
-      const float right = column - static_cast<float>(x), lower = row - static_cast<float>(y);
-      const float weight = (dx ? right : 1 - right) * (dy ? lower : 1 - lower);
-      for (size_t c = 0; c < 3; ++c) colour[c] += weight * sky_[3 * ((side * kSize + y + dy) * kSize + x + dx) + c];
-    }
-    return colour;
-  }
 
   TrainedMesh& mesh_;
+  const std::vector<BakedPatches>& patches_;
   std::vector<MeshTracer> tracers_;
-  std::vector<float> sky_;
+  std::vector<DenseNetwork> decoders_;
+  MeshContent sky_;  // only its sky
   ThreadPool pool_{0};
 };
 
@@ -137,7 +139,7 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
   for (const auto& part : mesh.parts) {
     ExtractionSettings settings;
     if (part->part().isBackground()) settings.raysPerCell = 0;
-    faces.push_back(extractFaces(*part, 0, capture, settings));
+    faces.push_back(extractFaces(*part, 0, capture, nullptr, settings));
     result["faces"].push_back(faces.back().count());
     part->level(0).keepFaces(faces.back().bits());
   }
@@ -152,10 +154,10 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
       settings.transparentBelow = 0;
     }
     const auto baking = Clock::now();
-    std::vector<MeshContent> contents;
+    std::vector<BakedPatches> contents;
     uint64_t triangles = 0, patches = 0, pairs = 0;
     for (size_t i = 0; i < mesh.parts.size(); ++i) {
-      contents.push_back(bakeMeshContent(*mesh.parts[i], 0, faces[i], settings));
+      contents.push_back(bakePatches(*mesh.parts[i], 0, faces[i], settings));
       triangles += contents.back().triangles();
       patches += contents.back().patches();
       pairs += contents.back().pairs;
@@ -165,19 +167,19 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
       result["triangles"] = triangles;
       result["patches"] = patches;
       result["pairs"] = pairs;
-      result["texel_bytes_rgba"] = patches * patchEdge * patchEdge * kMeshNumbers;
-      result["texel_bytes_bc4"] = patches * patchEdge * patchEdge * kMeshNumbers / 2;
+      result["texel_bytes_rgba"] = patches * patchEdge * patchEdge * BakedPatches::kNumbers;
+      result["texel_bytes_bc4"] = patches * patchEdge * patchEdge * BakedPatches::kNumbers / 2;
     }
-    ContentsRenderer contentsRenderer(mesh, contents);
-    evaluateAs(snapped ? "opaque_from_0.8" : "texels_of_8_bits", contentsRenderer);
+    PatchesRenderer patchesRenderer(mesh, contents);
+    evaluateAs(snapped ? "opaque_from_0.8" : "texels_of_8_bits", patchesRenderer);
     if (!snapped || patchEdge % 4 != 0) continue;
     for (const Bc4Effort effort : {Bc4Effort::fast, Bc4Effort::exhaustive}) {
-      std::vector<MeshContent> compressed = contents;
+      std::vector<BakedPatches> compressed = contents;
       const auto compressing = Clock::now();
-      for (MeshContent& content : compressed) passThroughBc4(content, effort);
+      for (BakedPatches& content : compressed) passThroughBc4(content, effort);
       const double compressingSeconds = seconds(compressing);
       const char* name = effort == Bc4Effort::fast ? "bc4_fast" : "bc4_exhaustive";
-      ContentsRenderer compressedRenderer(mesh, compressed);
+      PatchesRenderer compressedRenderer(mesh, compressed);
       evaluateAs(name, compressedRenderer);
       result[name]["seconds"] = compressingSeconds;
     }

@@ -54,7 +54,7 @@ std::unique_ptr<ViewRenderer> withWarnings(const fs::path& folder, uint64_t budg
 std::unique_ptr<ViewRenderer> makeSceneRenderer([[maybe_unused]] const Device& device, const fs::path& folder,
                                                 const Tileset& tileset, SceneRendererSettings settings) {
 #ifdef TESSERA_HAS_VULKAN
-  if (const auto context = vulkanContext(device)) {
+  if (const auto context = vulkanContext(device); context && hasGpuDrawer(tileset.representation)) {
     GpuRendererSettings ofGpu;
     ofGpu.draw = settings.draw;
     ofGpu.selection = settings.selection;

@@ -17,6 +17,7 @@
 #include "compute/vulkan/device.h"
 #include "gpu/context.h"
 #include "representations/gpu_drawers.h"
+#include "tiles/scene_folder.h"
 #endif
 
 namespace tessera {
@@ -128,7 +129,8 @@ ordered_json measureFrames(const Device& device, const fs::path& scene, const st
   std::string name;
 #ifdef TESSERA_HAS_VULKAN
   std::unique_ptr<GpuSceneRenderer> onGpu;
-  if (const auto context = vulkanContext(device)) {
+  const bool isDrawn = hasGpuDrawer(readTileset(scene).representation);
+  if (const auto context = vulkanContext(device); context && isDrawn) {
     GpuRendererSettings settings;
     settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
     settings.budgetBytes = sceneBudgetBytes(device);

@@ -36,6 +36,8 @@ class ContentSink {
   // the same name are stored once. `name`: letters, digits, '_'.
   virtual uint32_t addResource(const std::string& name, const std::string& mimeType,
                                std::span<const std::byte> bytes) = 0;
+  // Returns the uri of a resource that was added, relative to the folder of tileset.json.
+  virtual std::string resourceUri(uint32_t resource) const = 0;
   // Adds a content of a level of detail, 0 being the finest; levels may come in any order. `cells`: the cells of the
   // block grid that it covers; nothing for the background, of which a level has at most one. `glb`: its file.
   virtual void add(uint32_t level, const std::optional<CellRange>& cells, std::span<const std::byte> glb,

@@ -93,20 +93,19 @@ uint32_t SceneWriter::addTiles(size_t level, size_t group) {
     if (!tile.cells.contains(levels_[level - 1].contents[below].cells)) continue;
     const uint32_t child = addTiles(level - 1, below);
     tileset_.tiles[number].children.push_back(child);
+    SceneBox& box = tileset_.tiles[number].box;  // contents of finer levels may reach further
+    box.low = box.low.cwiseMin(tileset_.tiles[child].box.low);
+    box.high = box.high.cwiseMax(tileset_.tiles[child].box.high);
   }
   return number;
 }
 
 // Adds a root without contents of its own, for scenes whose top level has several tiles.
-void SceneWriter::addRoot(const Level& top) {
+void SceneWriter::addRoot() {
   Tile root;
   root.level = tileset_.levels++;
   root.cells = tileset_.allCells();
   root.box = tileset_.box();
-  for (const TileContent& content : top.contents) {
-    root.box.low = root.box.low.cwiseMin(content.box.low);
-    root.box.high = root.box.high.cwiseMax(content.box.high);
-  }
   root.geometricError = tileset_.tileFromScene().scale;
   tileset_.tiles.push_back(root);
 }
@@ -119,10 +118,13 @@ BakedScene SceneWriter::commit() {
   if (levels_[top].contents.size() == 1) {
     addTiles(top, 0);
   } else {
-    addRoot(levels_[top]);
+    addRoot();
     for (size_t group = 0; group < levels_[top].contents.size(); ++group) {
       const uint32_t child = addTiles(top, group);
       tileset_.tiles[0].children.push_back(child);
+      SceneBox& box = tileset_.tiles[0].box;
+      box.low = box.low.cwiseMin(tileset_.tiles[child].box.low);
+      box.high = box.high.cwiseMax(tileset_.tiles[child].box.high);
     }
   }
   for (const Level& level : levels_) {

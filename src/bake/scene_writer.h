@@ -15,6 +15,7 @@ class SceneWriter final : public ContentSink {
   SceneWriter(const fs::path& folder, const Capture& capture, const SceneDescription& about);
 
   uint32_t addResource(const std::string& name, const std::string& mimeType, std::span<const std::byte> bytes) override;
+  std::string resourceUri(uint32_t resource) const override { return tileset_.resources.at(resource).uri; }
   void add(uint32_t level, const std::optional<CellRange>& cells, std::span<const std::byte> glb,
            const ContentSummary& content, const std::vector<uint32_t>& resources = {}) override;
 
@@ -30,7 +31,7 @@ class SceneWriter final : public ContentSink {
     BakedLevel sizes;
   };
   uint32_t addTiles(size_t level, size_t group);
-  void addRoot(const Level& top);
+  void addRoot();
 
   SceneFolderWriter folder_;
   Tileset tileset_;

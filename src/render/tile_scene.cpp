@@ -89,6 +89,10 @@ TileScene openTileScene(const fs::path& folder, const ContentCodec& codec) {
     throw Error((folder / "tileset.json").string(), fmt::format("tile {}", *tile), "contents of a tile have no order",
                 "bake the scene again");
   }
+  if (const auto tile = tileBeyondItsCells(tileset); tile && !codec.contentsMayOverlap()) {
+    throw Error((folder / "tileset.json").string(), fmt::format("tile {}", *tile), "its box is not within its cells",
+                "bake the scene again");
+  }
   TileScene scene;
   scene.frame = makeTileFrame(tileset);
   scene.background = tileset.background;

@@ -79,6 +79,17 @@ std::array<float, 16> decodeBc4(const Bc4Block& block) {
   return texels;
 }
 
+float decodeBc4Texel(const uint8_t* block, uint32_t texel) {
+  const uint32_t bit = 3 * texel, byte = 2 + bit / 8;
+  // The index may reach into the next byte.
+  const uint32_t bits = block[byte] | (byte < 7 ? uint32_t{block[byte + 1]} << 8 : 0);
+  const int index = static_cast<int>(bits >> bit % 8 & 7), e0 = block[0], e1 = block[1];
+  if (index < 2) return static_cast<float>(index == 0 ? e0 : e1);
+  if (e0 > e1) return static_cast<float>((8 - index) * e0 + (index - 1) * e1) / 7;
+  if (index < 6) return static_cast<float>((6 - index) * e0 + (index - 1) * e1) / 5;
+  return index == 6 ? 0 : 255;
+}
+
 Bc4Block encodeBc4(const Bc4Texels& texels, Bc4Effort effort) {
   std::array<int, 256> counts{};
   for (const uint8_t texel : texels) ++counts[texel];

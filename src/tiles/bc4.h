@@ -20,6 +20,8 @@ using Bc4Texels = std::array<uint8_t, 16>;  // rows first
 std::array<float, 8> bc4Palette(uint8_t e0, uint8_t e1);
 // Returns the texels without rounding.
 std::array<float, 16> decodeBc4(const Bc4Block& block);
+// Returns one texel of a block of 8 bytes without rounding; `texel`: 0 to 15, rows first.
+float decodeBc4Texel(const uint8_t* block, uint32_t texel);
 
 enum class Bc4Effort {
   fast,        // the range of the texels as end points

@@ -91,6 +91,22 @@ TEST(Bc4, KeepsWhatItDecoded) {
   }
 }
 
+TEST(Bc4, DecodesASingleTexelAsInTheWholeBlock) {
+  const RandomStream random(9, 4);
+  int larger = 0;
+  for (uint64_t i = 0; i < 400; ++i) {
+    Bc4Block block;
+    for (uint64_t byte = 0; byte < block.size(); ++byte)
+      block[byte] = static_cast<uint8_t>(random.below(8 * i + byte, 256));
+    if (i % 50 == 0) block[1] = block[0];
+    larger += block[0] > block[1];
+    const std::array<float, 16> whole = decodeBc4(block);
+    for (uint32_t texel = 0; texel < 16; ++texel) EXPECT_NEAR(decodeBc4Texel(block.data(), texel), whole[texel], 1e-4);
+  }
+  EXPECT_GT(larger, 100) << "the palette of e0 > e1 is not tested";
+  EXPECT_LT(larger, 300) << "the other palette is not tested";
+}
+
 TEST(Bc4, DividesAnImageIntoBlocksRowByRow) {
   std::vector<uint8_t> texels(8 * 12);
   for (size_t i = 0; i < texels.size(); ++i) texels[i] = static_cast<uint8_t>(i / 8 / 4 * 100 + i % 8 / 4 * 50);

@@ -73,8 +73,9 @@ struct TileContent {
 struct Tile {
   uint32_t level = 0;  // 0 is the finest; a child's level is lower than its parent's
   CellRange cells;     // the cells that it covers, which its children together cover too
-  // Contains its contents and those below it, except the background block. It stays within the walls of its cells,
-  // except at the border of the grid (blocks there may own what lies outside), and may be lower than they are.
+  // Contains its contents and those below it, except the background block. Unless contents may overlap, it stays within
+  // the walls of its cells, except at the border of the grid (blocks there may own what lies outside). It may be lower
+  // than they are.
   SceneBox box;
   double geometricError =
       0;  // metres: error of drawing this tile instead of what it was baked from; at most its parent's
@@ -100,7 +101,7 @@ struct Tileset {
   // Cell (i, j) covers x in [2i - columns, 2i + 2 - columns] and, likewise, y in [2j - rows, 2j + 2 - rows]; the
   // scene's box is [-columns, columns] × [-rows, rows] × [bottom, top].
   uint32_t columns = 1, rows = 1;
-  double bottom = -1, top = 1;                  // in [-1,1]
+  double bottom = -1, top = 1;                  // in [-16,16]
   double near = 0.05;                           // scene units: nothing closer to a camera than this was trained
   std::array<float, 3> background = {0, 0, 0};  // colour behind everything, in the colour space of the photos
 
@@ -147,5 +148,8 @@ std::optional<std::string> validationError(const Tileset& tileset);
 // be ordered front to back for every camera; nothing if all do. Contents need no order in representations whose codec
 // lets them overlap.
 std::optional<uint32_t> tileWithoutOrder(const Tileset& tileset);
+// Returns the first tile whose box crosses a wall of its cells that is inside the grid; nothing if none does. Boxes may
+// do so where contents may overlap.
+std::optional<uint32_t> tileBeyondItsCells(const Tileset& tileset);
 
 }  // namespace tessera

@@ -15,6 +15,7 @@ namespace {
 using Broken = std::optional<std::string>;
 
 constexpr double kFarthestInScene = 1e7;
+constexpr double kHighest = 16;  // of the scene's box, in scene units
 constexpr uint32_t kMaxLevels = 64;
 constexpr size_t kMaxNameLength = 64;  // of a representation's name
 
@@ -78,8 +79,8 @@ Broken ruleOfFrames(const Tileset& tileset) {
   if (tileset.columns < 1 || tileset.columns > kMaxCells || tileset.rows < 1 || tileset.rows > kMaxCells) {
     return "the grid's columns or rows are out of bounds";
   }
-  if (!(tileset.bottom >= -1 && tileset.bottom < tileset.top && tileset.top <= 1)) {
-    return "the grid's heights are not within -1 and 1";
+  if (!(tileset.bottom >= -kHighest && tileset.bottom < tileset.top && tileset.top <= kHighest)) {
+    return "the grid's heights are not within -16 and 16";
   }
   if (!(tileset.near >= 0 && tileset.near <= 1)) return "near is not between 0 and 1";
   for (const float channel : tileset.background) {
@@ -166,7 +167,6 @@ Broken ruleOfTile(const Tileset& tileset, const Tile& tile) {
   if (tile.level >= tileset.levels) return "its level is not below the scene's number of levels";
   if (!isRange(tile.cells) || !tileset.allCells().contains(tile.cells)) return "its cells are not within the grid";
   if (!isBox(tile.box)) return "its box is empty or out of bounds";
-  if (!keepsToCells(tileset, tile)) return "its box is not within its cells";
   if (!isError(tile.geometricError)) return "its geometric error is not a length";
   return ruleOfContents(tileset, tile, &tile == &tileset.root());
 }
@@ -211,6 +211,12 @@ std::optional<uint32_t> tileWithoutOrder(const Tileset& tileset) {
     }
     if (!lieOnGrid(ranges)) return static_cast<uint32_t>(i);
   }
+  return std::nullopt;
+}
+
+std::optional<uint32_t> tileBeyondItsCells(const Tileset& tileset) {
+  for (size_t i = 0; i < tileset.tiles.size(); ++i)
+    if (!keepsToCells(tileset, tileset.tiles[i])) return static_cast<uint32_t>(i);
   return std::nullopt;
 }
 

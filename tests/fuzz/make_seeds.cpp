@@ -8,6 +8,8 @@
 #include "base/safetensors.h"
 #include "representations/hash/content/hash_payload.h"
 #include "representations/hash/testing/random_content.h"
+#include "representations/mesh/content/mesh_payload.h"
+#include "representations/mesh/testing/random_mesh.h"
 #include "representations/volume/content/volume_payload.h"
 #include "representations/volume/testing/random_content.h"
 #include "scene/ply.h"
@@ -142,6 +144,12 @@ int main(int count, char** arguments) {
     const auto glb = decodeGlb(file);
     write("hash_payload/whole" + std::to_string(parts), file);
     write("hash_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + toText(glb->bytes));
+  }
+  for (uint32_t parts : {1u, 2u}) {  // the first is a background block with a sky
+    const Bytes file = encodeMesh(tiles_test::randomMeshContent(1, parts, parts == 1));
+    const auto glb = decodeGlb(file);
+    write("mesh_payload/whole" + std::to_string(parts), file);
+    write("mesh_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + toText(glb->bytes));
   }
   return 0;
 }

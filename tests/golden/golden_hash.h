@@ -10,7 +10,7 @@ namespace tessera::golden {
 
 Scene<HashContent> makeHashScene();
 
-// The checksums that every reader must compute: docs/tile-format.md, section 11.
+// The checksums that every reader must compute: docs/tile-format.md, section 12.
 struct HashSums {
   uint64_t stored = 0, firstStored = 0, occupied = 0, distances = 0;
   ByteSums corners;

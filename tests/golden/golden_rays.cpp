@@ -5,12 +5,13 @@
 
 #include "base/random.h"
 #include "representations/hash/testing/reference_hash.h"
+#include "representations/mesh/testing/reference_mesh.h"
 #include "representations/volume/testing/reference_volume.h"
 
 namespace tessera::golden {
 namespace {
 
-constexpr uint64_t kRaysOfKind = 12, kKinds = 5;
+constexpr uint64_t kRaysOfKind = 12, kKinds = 5, kMeshKinds = 6;
 constexpr double kSceneEnd = TileFrame::kSceneEnd;
 
 // Evaluates a network without an activation at the outputs.
@@ -167,46 +168,70 @@ void look(const Scene<Content>& scene, ExpectedRay& ray) {
   blend.end();
 }
 
+// Contents of `mesh` have no order, and the background block has no march.
+ReferenceMeshView viewOnLevel(const Scene<MeshContent>& scene, uint32_t level) {
+  ReferenceMeshView view;
+  const SceneBox bounds = scene.tileset.box();
+  view.low = bounds.low;
+  view.high = bounds.high;
+  view.near = scene.tileset.near;
+  for (const char* name : {"0_0", "1_0"})
+    if (level == 0) view.blocks.push_back({&scene.contents.at(name)});
+  if (level == 1) view.blocks.push_back({&scene.contents.at("all")});
+  view.background = &scene.contents.at(level == 1 ? "coarse_background_block" : "background_block");
+  return view;
+}
+
+// Returns ray number `i`, not yet looked along. Each `attempt` gives another ray of the same kind.
+ExpectedRay makeRay(uint64_t i, uint64_t attempt) {
+  const RandomStream random(2024, 70);
+  const uint64_t number = i + kMeshKinds * kRaysOfKind * attempt;
+  const auto value = [&](uint64_t k) { return std::floor(64 * (2 * random.uniformDouble(8 * number + k) - 1)) / 64; };
+  ExpectedRay ray;
+  ray.level = i % 3 == 2 ? 1 : 0;
+  Vec3d target(1.9 * value(0), 0.9 * value(1), -0.45);
+  switch (i / kRaysOfKind) {
+    case 0:  // from outside to something on the ground
+      ray.origin = Vec3d(4 * value(2), 3 * value(3), 2 + value(4));
+      break;
+    case 1:  // over the ground and out of the box
+      ray.origin = Vec3d(1.5 * value(2), 0.75 * value(3), 0.6 + 0.1 * value(4));
+      target = Vec3d(6 * value(0), 5 * value(1), 0.4 * value(5));
+      break;
+    case 2:  // past the box, to the distant ground or to the sky
+      ray.origin = Vec3d(3 + value(2), 2 * value(3), 1.5);
+      target = ray.origin + Vec3d(1, value(0), 0.25 * value(1));
+      break;
+    case 3:  // so low over a roof or the ground that the ray samples several contents
+      if (i % 2 == 0) {
+        ray.origin = Vec3d(-3, 0.25 * value(2), 0.47 + 0.03 * value(3));
+        target = Vec3d(-0.8, 0.2 * value(4), 0.46 + 0.02 * value(5));
+      } else {
+        ray.origin = Vec3d(-3, 0.6 + 0.2 * value(2), -0.3 + 0.05 * value(3));
+        target = Vec3d(0, 0.6 + 0.2 * value(4), -0.38 + 0.04 * value(5));
+      }
+      break;
+    case 4:  // along an axis, from above or from the side
+      ray.origin = Vec3d(1.8 * value(2), 0.8 * value(3), 0.3 * value(4));
+      ray.origin[static_cast<Eigen::Index>(i % 3)] = i % 2 == 0 ? 3 : -3;
+      if (i % 3 == 2) ray.origin.z() = 3;
+      target = ray.origin;
+      target[static_cast<Eigen::Index>(i % 3)] = 0;
+      break;
+    default:  // to where contents of `mesh` overlap
+      ray.origin = Vec3d(2.5 * value(2), 1.5 * value(3), 0.2 + 0.4 * value(4));
+      target.x() = 0.25 * value(5);
+  }
+  ray.direction = (target - ray.origin).normalized();
+  return ray;
+}
+
 template <class Content, class Blend>
 std::vector<ExpectedRay> raysThrough(const Scene<Content>& scene) {
-  const RandomStream random(2024, 70);
   std::vector<ExpectedRay> rays;
   for (uint64_t i = 0; i < kKinds * kRaysOfKind; ++i) {
-    const auto value = [&](uint64_t k) { return std::floor(64 * (2 * random.uniformDouble(8 * i + k) - 1)) / 64; };
-    ExpectedRay ray;
-    ray.level = i % 3 == 2 ? 1 : 0;
-    Vec3d target(1.9 * value(0), 0.9 * value(1), -0.45);
-    switch (i / kRaysOfKind) {
-      case 0:  // from outside to something on the ground
-        ray.origin = Vec3d(4 * value(2), 3 * value(3), 2 + value(4));
-        break;
-      case 1:  // over the ground and out of the box
-        ray.origin = Vec3d(1.5 * value(2), 0.75 * value(3), 0.6 + 0.1 * value(4));
-        target = Vec3d(6 * value(0), 5 * value(1), 0.4 * value(5));
-        break;
-      case 2:  // past the box, to the distant ground or to the sky
-        ray.origin = Vec3d(3 + value(2), 2 * value(3), 1.5);
-        target = ray.origin + Vec3d(1, value(0), 0.25 * value(1));
-        break;
-      case 3:  // so low over a roof or the ground that the ray samples several contents
-        if (i % 2 == 0) {
-          ray.origin = Vec3d(-3, 0.25 * value(2), 0.47 + 0.03 * value(3));
-          target = Vec3d(-0.8, 0.2 * value(4), 0.46 + 0.02 * value(5));
-        } else {
-          ray.origin = Vec3d(-3, 0.6 + 0.2 * value(2), -0.3 + 0.05 * value(3));
-          target = Vec3d(0, 0.6 + 0.2 * value(4), -0.38 + 0.04 * value(5));
-        }
-        break;
-      default:  // along an axis, from above or from the side
-        ray.origin = Vec3d(1.8 * value(2), 0.8 * value(3), 0.3 * value(4));
-        ray.origin[static_cast<Eigen::Index>(i % 3)] = i % 2 == 0 ? 3 : -3;
-        if (i % 3 == 2) ray.origin.z() = 3;
-        target = ray.origin;
-        target[static_cast<Eigen::Index>(i % 3)] = 0;
-    }
-    ray.direction = (target - ray.origin).normalized();
-    look<Content, Blend>(scene, ray);
-    rays.push_back(ray);
+    rays.push_back(makeRay(i, 0));
+    look<Content, Blend>(scene, rays.back());
   }
   return rays;
 }
@@ -219,6 +244,23 @@ std::vector<ExpectedRay> makeRays(const Scene<VolumeContent>& scene) {
 
 std::vector<ExpectedRay> makeRays(const Scene<HashContent>& scene) {
   return raysThrough<HashContent, HashBlend>(scene);
+}
+
+std::vector<ExpectedRay> makeRays(const Scene<MeshContent>& scene) {
+  std::vector<ExpectedRay> rays;
+  for (uint64_t i = 0; i < kMeshKinds * kRaysOfKind; ++i) {
+    for (uint64_t attempt = 0; rays.size() == i; ++attempt) {
+      ExpectedRay ray = makeRay(i, attempt);
+      const ReferenceMeshView view = viewOnLevel(scene, ray.level);
+      if (isReferenceMeshUnsure(view, {ray.origin, ray.direction})) continue;
+      const ReferenceMeshPixel pixel = traceReferenceMesh(view, {ray.origin, ray.direction});
+      ray.colour = pixel.colour;
+      ray.opacity = pixel.opacity;
+      ray.distance = pixel.distance;
+      rays.push_back(ray);
+    }
+  }
+  return rays;
 }
 
 }  // namespace tessera::golden

@@ -12,7 +12,7 @@ namespace tessera::golden {
 Scene<VolumeContent> makeVolumeScene();
 
 // The checksums that every reader, in C++ and in a browser, must compute: sums of integers below 2^53.
-// docs/tile-format.md, section 11.
+// docs/tile-format.md, section 12.
 struct VolumeSums {
   uint64_t stored = 0, firstStored = 0, occupied = 0, distances = 0;
   ByteSums voxels;

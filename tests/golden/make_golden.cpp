@@ -1,20 +1,26 @@
-// make_golden volume|hash DIR: writes a golden scene with sums.json and rays.json, against which readers and renderers
-// in every language are tested. Run it again only when the format changes, and say so in the commit.
+// make_golden volume|hash|mesh DIR: writes a golden scene with sums.json and rays.json, against which readers and
+// renderers in every language are tested. Run it again only when the format changes, and say so in the commit.
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/image_io.h"
 #include "golden/golden_hash.h"
+#include "golden/golden_mesh.h"
 #include "golden/golden_rays.h"
 #include "golden/golden_volume.h"
 #include "representations/hash/content/hash_payload.h"
+#include "representations/mesh/content/fallback_mesh.h"
+#include "representations/mesh/content/mesh_payload.h"
 #include "representations/volume/content/volume_payload.h"
 #include "tiles/scene_folder.h"
 
 using namespace tessera;
 
 namespace {
+
+constexpr int kEffort = 9;
 
 // Formats one ray per line.
 std::string raysToJson(const std::vector<golden::ExpectedRay>& rays) {
@@ -33,13 +39,45 @@ std::string raysToJson(const std::vector<golden::ExpectedRay>& rays) {
   return text + "\n]\n";
 }
 
+// Returns a texture for the ordinary mesh of a part: a colour for each patch, with the part's opacity.
+ImageU8 baseColourTexture(const PatchSet& part) {
+  const uint32_t edge = part.patchEdge, across = part.patchesAcross();
+  ImageU8 texture(static_cast<int>(part.textureWidth()), static_cast<int>(part.textureHeight()), 4);
+  for (uint32_t patch = 0; patch < part.patches; ++patch) {
+    for (uint32_t y = 0; y < edge; ++y)
+      for (uint32_t x = 0; x < edge; ++x) {
+        uint8_t* const texel =
+            texture.at(static_cast<int>(patch % across * edge + x), static_cast<int>(patch / across * edge + y));
+        for (uint32_t c = 0; c < 3; ++c) texel[c] = static_cast<uint8_t>(64 + (patch * (c + 1) * 37 + 8 * x) % 160);
+        const MeshTexel mixed = mixTexels(part, patch, static_cast<float>(x), static_cast<float>(y));
+        texel[3] = static_cast<uint8_t>(255 * mixed.opacity + 0.5f);
+      }
+  }
+  return texture;
+}
+
+// Encodes a content with an ordinary mesh for other programs, whose textures become resources of the scene.
+Bytes encodeWithFallback(const MeshContent& mesh, const std::string& name, const SceneFolderWriter& writer,
+                         Tileset& tileset) {
+  ContentFileWriter file;
+  FallbackMesh fallback(file, tileset.tileFromScene());
+  for (size_t i = 0; i < mesh.parts.size(); ++i) {
+    const Bytes png = encodePng(baseColourTexture(mesh.parts[i]));
+    const std::string uri = writer.addResource(name + "_" + std::to_string(i), "png", png);
+    tileset.resources.push_back({uri, "image/png", png.size()});
+    fallback.add(mesh.parts[i], "../../" + uri);
+  }
+  return encodeMesh(mesh, std::move(file), fallback.scene());
+}
+
+// `encode`: returns the file of a content, by its name.
 template <class Content, class Encode>
 void write(const fs::path& root, golden::Scene<Content> scene, const Encode& encode) {
   const SceneFolderWriter writer(root);
   Tileset& tileset = scene.tileset;
   nlohmann::ordered_json sums;
   const auto writeContent = [&](TileContent& content, uint32_t level, const std::string& name) {
-    const Bytes bytes = encode(scene.contents.at(name), 9);
+    const Bytes bytes = encode(scene.contents.at(name), name, writer, tileset);
     content.uri = writer.addContent(level, name, bytes);
     content.bytes = bytes.size();
     for (const auto& part : scene.contents.at(name).parts)
@@ -62,9 +100,13 @@ int main(int count, char** arguments) {
   try {
     const std::string kind = arguments[1];
     if (kind == "volume") {
-      write(arguments[2], golden::makeVolumeScene(), encodeVolume);
+      write(arguments[2], golden::makeVolumeScene(),
+            [](const VolumeContent& content, auto&&...) { return encodeVolume(content, kEffort); });
     } else if (kind == "hash") {
-      write(arguments[2], golden::makeHashScene(), encodeHash);
+      write(arguments[2], golden::makeHashScene(),
+            [](const HashContent& content, auto&&...) { return encodeHash(content, kEffort); });
+    } else if (kind == "mesh") {
+      write(arguments[2], golden::makeMeshScene(), encodeWithFallback);
     } else {
       return 2;
     }

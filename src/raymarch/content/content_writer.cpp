@@ -1,7 +1,5 @@
 #include "raymarch/content/content_writer.h"
 
-#include <fmt/format.h>
-
 #include <bit>
 
 #include "tiles/lossless_image.h"
@@ -45,27 +43,6 @@ ContentWriter::Json ContentWriter::pictures(const TexelPictures& three) {
 
 ContentWriter::Json ContentWriter::picture(const ImageU8& image) {
   return file_.add(encodeLossless(image, effort_), kWebP);
-}
-
-Error contentTooLarge(const std::string& why, const std::string& remedy) {
-  return {"a content that was to be written", "", why, remedy};
-}
-
-void requireContentWithin(const ContentLimits& limits, size_t parts, uint64_t bytes, const std::string& remedy) {
-  if (parts > limits.parts) {
-    throw contentTooLarge(fmt::format("merges {} blocks, and readers take {} at most", parts, limits.parts), remedy);
-  }
-  if (bytes > limits.bytes) {
-    throw contentTooLarge(fmt::format("takes {} bytes of memory, and readers take {} at most", bytes, limits.bytes),
-                          remedy);
-  }
-}
-
-void requireFileWithin(const ContentLimits& limits, uint64_t bytes, const std::string& remedy) {
-  if (bytes > limits.fileBytes) {
-    throw contentTooLarge(fmt::format("takes {} bytes on disk, and readers take {} at most", bytes, limits.fileBytes),
-                          remedy);
-  }
 }
 
 }  // namespace tessera

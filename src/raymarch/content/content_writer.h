@@ -5,11 +5,11 @@
 #include <span>
 #include <vector>
 
-#include "base/error.h"
 #include "raymarch/content/content_part.h"
 #include "raymarch/content/texel_pictures.h"
 #include "tiles/content.h"
 #include "tiles/content_file.h"
+#include "tiles/writer_limits.h"
 
 namespace tessera {
 
@@ -34,13 +34,5 @@ class ContentWriter {
  private:
   int effort_;
 };
-
-// The errors below are for contents that readers would reject and that settings of the training can cause.
-
-Error contentTooLarge(const std::string& why, const std::string& remedy);
-// Throws contentTooLarge if there are more parts, or bytes of memory, than readers accept.
-void requireContentWithin(const ContentLimits& limits, size_t parts, uint64_t bytes, const std::string& remedy);
-// Throws contentTooLarge if the file is larger than readers accept.
-void requireFileWithin(const ContentLimits& limits, uint64_t bytes, const std::string& remedy);
 
 }  // namespace tessera

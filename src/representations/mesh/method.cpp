@@ -1,5 +1,9 @@
 #include "representations/mesh/method.h"
 
+#include <bit>
+
+#include "base/error.h"
+#include "representations/mesh/bake/mesh_baker.h"
 #include "representations/mesh/train/mesh_renderer.h"
 #include "representations/mesh/train/train_mesh.h"
 
@@ -15,6 +19,41 @@ std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
   auto mesh = std::make_unique<TrainedMesh>(loadTrainedMesh(device, folder));
   auto renderer = std::make_unique<MeshRenderer>(*mesh);
   return std::make_unique<ModelWithRenderer<TrainedMesh, MeshRenderer>>(std::move(mesh), std::move(renderer));
+}
+
+constexpr std::string_view kTexels = "texels", kTilesPerBlock = "tiles_per_block", kFallback = "fallback";
+constexpr BakeParameter kBakeParameters[] = {
+    {.name = kTexels,
+     .help = "texels along the edge of a patch of two triangles, 8 to 32; 0: as the model was trained with",
+     .minimum = 0,
+     .maximum = PatchSet::kMaxPatchEdge,
+     .divisibleBy = 4,
+     .standard = MeshSceneSettings().patchEdge},
+    {.name = kTilesPerBlock,
+     .help = "tiles along an edge of a block at the finest level: 1, 2, 4, 8 or 16; 0: one for each 32 cells",
+     .minimum = 0,
+     .maximum = kMaxTilesPerBlock,
+     .standard = MeshSceneSettings().tilesPerBlock},
+    {.name = kFallback,
+     .help = "1: with ordinary textured meshes, for programs that know only glTF; 0: without",
+     .minimum = 0,
+     .maximum = 1,
+     .standard = MeshSceneSettings().fallback ? 1 : 0}};
+
+std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const BakeParameters& parameters) {
+  const auto value = [&](std::string_view name) { return static_cast<uint32_t>(parameters.at(std::string(name))); };
+  MeshSceneSettings settings;
+  settings.patchEdge = value(kTexels);
+  settings.tilesPerBlock = value(kTilesPerBlock);
+  settings.fallback = value(kFallback) != 0;
+  if (settings.patchEdge > 0 && settings.patchEdge < PatchSet::kMinPatchEdge) {
+    throw Error("--texels " + std::to_string(settings.patchEdge), "", "is less than a patch has", "use 8 or more");
+  }
+  if (settings.tilesPerBlock > 0 && !std::has_single_bit(settings.tilesPerBlock)) {
+    throw Error("--tiles-per-block " + std::to_string(settings.tilesPerBlock), "", "is not a power of two",
+                "use 0, 1, 2, 4, 8 or 16");
+  }
+  return makeMeshBaker(loadTrainedMesh(device, folder), settings);
 }
 
 std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& settings) {
@@ -38,6 +77,8 @@ const Method& meshMethod() {
       .settings = makeSettings<MeshConfig>,
       .train = train,
       .openModel = openModel,
+      .openBaker = openBaker,
+      .bakeParameters = kBakeParameters,
       .describe = describe,
   };
   return kMethod;

@@ -1,5 +1,5 @@
 // The common part of the readers of ray-marched contents. The bytes are untrusted. docs/tile-format.md, sections 6, 7
-// and 10.
+// and 11.
 import { ContentReader } from '../tiles/content-reader';
 import { getArray, getField, getBoolean, getNumbers, getInteger, type Json } from '../tiles/json-fields';
 import type { Vec3 } from '../tiles/tileset';

@@ -1,4 +1,4 @@
-// Reads the golden scenes (docs/tile-format.md, section 11) for tests in Node.
+// Reads the golden scenes (docs/tile-format.md, section 12) for tests in Node.
 import { readFileSync } from 'node:fs';
 import { createRequire } from 'node:module';
 import type { KnownRepresentation } from '../representations/codecs';

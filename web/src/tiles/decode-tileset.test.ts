@@ -53,7 +53,7 @@ describe('decodeTileset', () => {
     ['sourceFromWorld is not affine', (file) => (ours(file).sourceFromWorld[15] = 2)],
     ['the georeference is not a place', (file) => (ours(file).georeference.latitude = 91)],
     ["the grid's box is not that of its cells", (file) => (ours(file).grid.low[0] = -3)],
-    ["the grid's heights", (file) => (ours(file).grid.high[2] = 2)],
+    ["the grid's heights", (file) => (ours(file).grid.high[2] = 17)],
     ['the number of levels', (file) => (ours(file).levels = 65)],
     ['near is not between', (file) => (ours(file).near = -1)],
     ['the background is not a colour', (file) => (ours(file).background[1] = 1.5)],

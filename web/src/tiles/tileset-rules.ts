@@ -90,7 +90,7 @@ function ruleOfFrames(tileset: Tileset): Broken {
   }
   const bottom = tileset.box.low[2];
   const top = tileset.box.high[2];
-  if (!(bottom >= -1 && bottom < top && top <= 1)) return "the grid's heights are not within -1 and 1";
+  if (!(bottom >= -16 && bottom < top && top <= 16)) return "the grid's heights are not within -16 and 16";
   if (!(tileset.near >= 0 && tileset.near <= 1)) return 'near is not between 0 and 1';
   if (!tileset.background.every((x) => x >= 0 && x <= 1)) return 'the background is not a colour';
   const geo = tileset.georeference;

@@ -1,7 +1,7 @@
 // Decodes hash contents from arbitrary bytes. Memory stays bounded, and every accepted content satisfies the rules and
 // survives a round trip.
-#include "raymarch/testing/content_fuzz.h"
 #include "representations/hash/content/hash_payload.h"
+#include "tiles/testing/content_fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace tessera;

@@ -2,14 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
-#include "representations/mesh/bake/mesh_patches.h"
+#include "representations/mesh/train/mesh_patches.h"
 
 namespace tessera {
 namespace {
 
-constexpr uint32_t kTexelsAtATime = 1 << 16;
+constexpr uint32_t kPlacesAtATime = 1 << 16;
+constexpr uint32_t kMaxPlacesPerEdge = 4;  // of a texel
 
 // The decoder's weights without padding.
 std::vector<DenseLayer> readDecoder(MeshModel& model) {
@@ -23,93 +25,163 @@ std::vector<DenseLayer> readDecoder(MeshModel& model) {
     for (uint32_t o = 0; o < layer.outputs; ++o)
       for (uint32_t i = 0; i < layer.inputs; ++i)
         layer.weights.push_back(weights[shape.weightOffset(l) + size_t{o} * shape.layerInputs(l) + i]);
+    layer.biases.assign(layer.outputs, 0);
     layers.push_back(layer);
   }
   return layers;
 }
 
-// Writes the position in the field of a point of the scene.
-void toFieldPosition(const OctahedraGrid& grid, const Vec3d& point, float* position) {
-  double g[4];
-  for (size_t row = 0; row < 4; ++row) {
-    const float* const m = grid.gridFromScene.data() + 4 * row;
-    g[row] = double{m[0]} * point.x() + double{m[1]} * point.y() + double{m[2]} * point.z() + m[3];
+// What the field says about a texel.
+struct FieldTexel {
+  std::array<float, kMeshFeatures> features{};
+  float opacity = 0;
+  std::array<float, 3> colour{};
+};
+
+// Evaluates the field of a model at the texels of patches.
+class TexelField {
+ public:
+  TexelField(MeshModel& model, uint32_t level, const TriangleList& list, const std::vector<TrianglePatch>& patches,
+             const FaceSet& faces, const MeshBakeSettings& settings)
+      : model_(model),
+        domain_(model.level(level).domain()),
+        list_(list),
+        patches_(patches),
+        settings_(settings),
+        placesPerEdge_(std::min(1u << level, kMaxPlacesPerEdge)) {
+    Device& device = model.device();
+    model.field().reserve(kPlacesAtATime);
+    positions_ = device.array<float>(size_t{3} * kPlacesAtATime);
+    encoded_ = device.array<float>(size_t{kMeshFeatures} * kPlacesAtATime);
+    if (!settings.baseColours) return;
+    patchOfPlace_ = device.array<uint32_t>(kPlacesAtATime);
+    std::vector<float> directions;
+    for (const TrianglePatch& patch : patches) {
+      Vec3f sum = faces.direction(list.faceOfTriangle[patch.triangles[0]]);
+      if (patch.isPair) sum += faces.direction(list.faceOfTriangle[patch.triangles[1]]);
+      const Vec3f direction = sum.isZero() ? Vec3f(-Vec3f::UnitZ()) : Vec3f(sum.normalized());
+      for (int axis = 0; axis < 3; ++axis) directions.push_back(direction[axis]);
+    }
+    if (directions.empty()) directions.resize(3);
+    directions_ = device.uploadArray(directions);
   }
-  for (int axis = 0; axis < 3; ++axis) {
-    const double at = (g[axis] / g[3] + grid.positionOffset[axis]) * grid.positionScale();
-    position[axis] = static_cast<float>(std::clamp(at, 0.0, 1.0));
+
+  // Calls use(texel, what the field says) for all texels, [patches][T][T], in order.
+  void forEachTexel(bool withColours, const std::function<void(size_t, const FieldTexel&)>& use) {
+    const uint32_t places = placesPerEdge_ * placesPerEdge_, texelsAtATime = kPlacesAtATime / places;
+    const size_t texels = patches_.size() * settings_.patchEdge * settings_.patchEdge;
+    for (size_t first = 0; first < texels; first += texelsAtATime) {
+      const uint32_t count = static_cast<uint32_t>(std::min<size_t>(texelsAtATime, texels - first));
+      const std::vector<float> features = evaluate(first, count * places);
+      const std::vector<float> colours = withColours ? evaluateColours(count * places) : std::vector<float>();
+      for (uint32_t i = 0; i < count; ++i) use(first + i, mean(features, colours, i * places, places));
+    }
   }
-}
+
+ private:
+  std::vector<float> evaluate(size_t firstTexel, uint32_t places) {
+    std::vector<float> positions(size_t{3} * kPlacesAtATime);
+    patchOfPlaces_.assign(kPlacesAtATime, 0);
+    const uint32_t edge = settings_.patchEdge, perTexel = placesPerEdge_ * placesPerEdge_;
+    for (uint32_t i = 0; i < places; ++i) {
+      const size_t texel = firstTexel + i / perTexel;
+      const uint32_t number = static_cast<uint32_t>(texel / (size_t{edge} * edge)),
+                     within = static_cast<uint32_t>(texel % (size_t{edge} * edge)), place = i % perTexel;
+      const TrianglePatch& patch = patches_[number];
+      const auto shifted = [&](uint32_t at, uint32_t part) { return at + (part + 0.5) / placesPerEdge_ - 0.5; };
+      std::array<Vec3d, 4> corners;
+      for (int corner = 0; corner < 4; ++corner) corners[corner] = list_.vertices[patch.corners[corner]];
+      const Vec3d at = texelPosition(corners, patch.isPair, shifted(within % edge, place % placesPerEdge_),
+                                     shifted(within / edge, place / placesPerEdge_), edge);
+      toFieldPosition(domain_.grids[patch.grid], at, &positions[size_t{3} * i]);
+      patchOfPlaces_[i] = number;
+    }
+    Device& device = model_.device();
+    device.write(positions_.all(), std::span<const float>(positions));
+    model_.field().encode({places}, positions_, Matrix<float>(encoded_, kMeshFeatures));
+    return device.read(encoded_.part(0, size_t{kMeshFeatures} * places));
+  }
+
+  // Of the places of the last call of evaluate().
+  std::vector<float> evaluateColours(uint32_t places) {
+    Device& device = model_.device();
+    device.write(patchOfPlace_.all(), std::span<const uint32_t>(patchOfPlaces_));
+    const MeshField::Output output = model_.field().forward({places}, positions_, directions_, patchOfPlace_, false);
+    std::vector<float> colours(size_t{3} * places);
+    const std::vector<float> all = device.read(output.colours.data);
+    for (size_t i = 0; i < places; ++i)
+      for (size_t c = 0; c < 3; ++c) colours[3 * i + c] = all[output.colours.rowStride * i + c];
+    return colours;
+  }
+
+  FieldTexel mean(const std::vector<float>& features, const std::vector<float>& colours, uint32_t first,
+                  uint32_t places) const {
+    FieldTexel texel;
+    const float share = 1.0f / static_cast<float>(places);
+    for (size_t place = first; place < first + size_t{places}; ++place) {
+      for (size_t f = 0; f < kMeshFeatures; ++f) texel.features[f] += share * features[kMeshFeatures * place + f];
+      texel.opacity += share / (1 + std::exp(-features[kMeshFeatures * place] - model_.opacityOffset()));
+      for (size_t c = 0; c < 3 && !colours.empty(); ++c) texel.colour[c] += share * colours[3 * place + c];
+    }
+    if (texel.opacity >= settings_.opaqueFrom) texel.opacity = 1;
+    if (texel.opacity < settings_.transparentBelow) texel.opacity = 0;
+    return texel;
+  }
+
+  MeshModel& model_;
+  const OctahedraDomain& domain_;
+  const TriangleList& list_;
+  const std::vector<TrianglePatch>& patches_;
+  const MeshBakeSettings& settings_;
+  uint32_t placesPerEdge_;
+  Array<float> positions_, encoded_, directions_;
+  Array<uint32_t> patchOfPlace_;
+  std::vector<uint32_t> patchOfPlaces_;
+};
 
 }  // namespace
 
-MeshContent bakeMeshContent(MeshModel& model, uint32_t level, const FaceSet& faces, const MeshBakeSettings& settings) {
+BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces, const MeshBakeSettings& settings) {
   const OctahedraDomain& domain = model.level(level).domain();
-  Device& device = model.device();
-  const TriangleList list = listTriangles(domain.grids, domain.ownGrids,
-                                          device.read(model.level(level).displacements().values.all()), faces.bits());
+  const TriangleList list =
+      listTriangles(domain.grids, domain.ownGrids, model.device().read(model.level(level).displacements().values.all()),
+                    faces.bits());
   const std::vector<TrianglePatch> patches = pairTriangles(list);
-  MeshContent content;
-  content.patchEdge = settings.patchEdge;
-  content.decoder = readDecoder(model);
-  const size_t texelsPerPatch = size_t{settings.patchEdge} * settings.patchEdge;
-  const size_t texels = texelsPerPatch * patches.size();
+  BakedPatches baked;
+  baked.patchEdge = settings.patchEdge;
+  baked.decoder = readDecoder(model);
   for (const TrianglePatch& patch : patches) {
-    content.pairs += patch.isPair ? 1 : 0;
+    baked.pairs += patch.isPair ? 1 : 0;
     for (const uint32_t corner : patch.corners)
-      for (int axis = 0; axis < 3; ++axis) content.vertices.push_back(static_cast<float>(list.vertices[corner][axis]));
+      for (int axis = 0; axis < 3; ++axis) baked.vertices.push_back(list.vertices[corner][axis]);
   }
-
-  // The output of the encoder at all texels.
-  std::vector<float> features;
-  features.reserve(texels * kMeshFeatures);
-  model.field().reserve(kTexelsAtATime);
-  Array<float> positions = device.array<float>(size_t{3} * kTexelsAtATime),
-               encoded = device.array<float>(size_t{kMeshFeatures} * kTexelsAtATime);
-  std::vector<float> chunk(size_t{3} * kTexelsAtATime);
-  for (size_t first = 0; first < texels; first += kTexelsAtATime) {
-    const uint32_t count = static_cast<uint32_t>(std::min<size_t>(kTexelsAtATime, texels - first));
-    for (uint32_t i = 0; i < count; ++i) {
-      const TrianglePatch& patch = patches[(first + i) / texelsPerPatch];
-      const uint32_t texel = static_cast<uint32_t>((first + i) % texelsPerPatch);
-      std::array<Vec3d, 4> corners;
-      for (int corner = 0; corner < 4; ++corner) corners[corner] = list.vertices[patch.corners[corner]];
-      const Vec3d at = texelPosition(corners, patch.isPair, texel % settings.patchEdge, texel / settings.patchEdge,
-                                     settings.patchEdge);
-      toFieldPosition(domain.grids[patch.grid], at, &chunk[size_t{3} * i]);
-    }
-    device.write(positions.all(), std::span<const float>(chunk));
-    model.field().encode({count}, positions, Matrix<float>(encoded, kMeshFeatures));
-    const std::vector<float> some = device.read(encoded.part(0, size_t{kMeshFeatures} * count));
-    features.insert(features.end(), some.begin(), some.end());
-  }
-
-  // Ranges of the features where anything is visible.
-  std::vector<float> opacities(texels);
-  for (auto& range : content.ranges) {
+  // The field is evaluated twice: first for the ranges of the features, of what is visible.
+  TexelField field(model, level, list, patches, faces, settings);
+  for (auto& range : baked.ranges) {
     range.low = std::numeric_limits<float>::infinity();
     range.high = -range.low;
   }
-  for (size_t texel = 0; texel < texels; ++texel) {
-    float opacity = 1 / (1 + std::exp(-features[kMeshFeatures * texel] - model.opacityOffset()));
-    if (opacity >= settings.opaqueFrom) opacity = 1;
-    if (opacity < settings.transparentBelow) opacity = 0;
-    opacities[texel] = opacity;
-    if (opacity == 0) continue;
-    for (uint32_t f = 0; f < kMeshFeatures; ++f) {
-      content.ranges[f].low = std::min(content.ranges[f].low, features[kMeshFeatures * texel + f]);
-      content.ranges[f].high = std::max(content.ranges[f].high, features[kMeshFeatures * texel + f]);
-    }
-  }
-  for (auto& range : content.ranges)
+  const bool hasRanges = level == 0 && model.atlas();  // those that training has used
+  for (uint32_t f = 0; hasRanges && f < kMeshFeatures; ++f)
+    baked.ranges[f] = {model.atlas()->ranges[2 * f], model.atlas()->ranges[2 * f + 1]};
+  if (!hasRanges)
+    field.forEachTexel(false, [&](size_t, const FieldTexel& texel) {
+      for (uint32_t f = 0; texel.opacity > 0 && f < kMeshFeatures; ++f) {
+        baked.ranges[f].low = std::min(baked.ranges[f].low, texel.features[f]);
+        baked.ranges[f].high = std::max(baked.ranges[f].high, texel.features[f]);
+      }
+    });
+  for (auto& range : baked.ranges)
     if (!(range.low <= range.high)) range = {0, 0};
-  content.texels.resize(texels * kMeshNumbers);
-  for (size_t texel = 0; texel < texels; ++texel) {
-    for (uint32_t f = 0; f < kMeshFeatures; ++f)
-      content.texels[kMeshNumbers * texel + f] = content.ranges[f].encode(features[kMeshFeatures * texel + f]);
-    content.texels[kMeshNumbers * texel + kMeshFeatures] = FeatureRange{0, 1}.encode(opacities[texel]);
-  }
-  return content;
+  const size_t texels = patches.size() * settings.patchEdge * settings.patchEdge;
+  baked.texels.reserve(texels * BakedPatches::kNumbers);
+  field.forEachTexel(settings.baseColours, [&](size_t, const FieldTexel& texel) {
+    for (uint32_t f = 0; f < kMeshFeatures; ++f) baked.texels.push_back(baked.ranges[f].encode(texel.features[f]));
+    baked.texels.push_back(FeatureRange{0, 1}.encode(texel.opacity));
+    for (size_t c = 0; settings.baseColours && c < 3; ++c)
+      baked.baseColours.push_back(FeatureRange{0, 1}.encode(texel.colour[c]));
+  });
+  return baked;
 }
 
 }  // namespace tessera

@@ -1,7 +1,7 @@
 // Bakes a part of a trained mesh: the triangles that extraction keeps, and the output of the encoder at their texels.
 #pragma once
 
-#include "representations/mesh/content/mesh_content.h"
+#include "representations/mesh/bake/baked_patches.h"
 #include "representations/mesh/train/extraction.h"
 
 namespace tessera {
@@ -10,9 +10,11 @@ struct MeshBakeSettings {
   uint32_t patchEdge = 8;          // texels along the edge of a patch
   float opaqueFrom = 0.8f;         // from this opacity on, texels are stored as opaque
   float transparentBelow = 0.02f;  // below, as transparent
+  bool baseColours = false;        // for an ordinary mesh: colours as the training photos see them on average
 };
 
-// Bakes the given faces of a level. Vertices are in the frame of the part.
-MeshContent bakeMeshContent(MeshModel& model, uint32_t level, const FaceSet& faces, const MeshBakeSettings& settings);
+// Bakes the given faces of a level. A texel of a coarse level is the mean of the encoder's output at several places in
+// it, because single places alias.
+BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces, const MeshBakeSettings& settings);
 
 }  // namespace tessera

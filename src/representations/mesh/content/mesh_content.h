@@ -1,59 +1,97 @@
 // One content of a `mesh` scene in memory (Gu et al. 2023, UE4-NeRF, section 3.2): triangles in patches of texels, and
-// the network that turns the features of a texel, seen from a direction, into a colour.
+// the networks that turn the features of a texel, seen from a direction, into a colour. docs/tile-format.md, section 8,
+// defines what all of it means.
 #pragma once
 
 #include <array>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
-#include "tiles/bc4.h"
+#include "scene/axes.h"
 #include "tiles/dense_layer.h"
 
 namespace tessera {
 
+struct TileContent;  // tiles/tileset.h
+
+inline constexpr const char* kMeshName = "mesh";  // the name of the representation in files
+
 inline constexpr uint32_t kMeshFeatures = 8;
 inline constexpr uint32_t kMeshHarmonics = 9;  // of the direction, inputs of the decoder after the features
-inline constexpr uint32_t kMeshNumbers = kMeshFeatures + 1;  // of a texel: the features, and the opacity
 
 // The values that a byte stands for: linear from `low` (0) to `high` (255).
 struct FeatureRange {
   float low = 0, high = 1;
 
-  float decode(uint8_t byte) const { return low + (high - low) * (static_cast<float>(byte) / 255); }
+  bool operator==(const FeatureRange&) const = default;
+  float decode(float byte) const { return low + (high - low) * (byte / 255); }
   // The nearest byte, clamped to the range.
   uint8_t encode(float value) const;
-};
-
-// Patch p is a square of patchEdge² texels. Its corners, vertices 4p to 4p + 3, lie at the centres of its outermost
-// texels (0, 0), (T-1, 0), (0, T-1) and (T-1, T-1). Its triangles have the vertices (4p, 4p+1, 4p+2) and
-// (4p+3, 4p+2, 4p+1); patches from `pairs` on have the first alone. Texels are mixed bilinearly.
-struct MeshContent {
-  uint32_t patchEdge = 8;  // T
-  uint32_t pairs = 0;
-  std::vector<float> vertices;                     // [patches][4][3], scene units
-  std::vector<uint8_t> texels;                     // [patches][T][T][kMeshNumbers], rows first; opacity / 255 last
-  std::array<FeatureRange, kMeshFeatures> ranges;  // of the features
-  std::vector<DenseLayer> decoder;                 // without biases
-
-  uint32_t patches() const { return static_cast<uint32_t>(vertices.size() / 12); }
-  uint32_t triangles() const { return patches() + pairs; }
 };
 
 struct MeshTexel {
   std::array<float, kMeshFeatures> features{};
   float opacity = 0;
 };
-// Mixes the texels of a patch at texel coordinates in [0, T-1].
-MeshTexel mixTexels(const MeshContent& content, uint32_t patch, float column, float row);
 
-// Replaces the texels by what remains of them after block compression of each of the nine numbers, rounded to 8 bits.
-// patchEdge is a multiple of 4.
-void passThroughBc4(MeshContent& content, Bc4Effort effort);
+// The triangles of one block, or of a piece of it, and the network that they share. Patch p is a square of patchEdge²
+// texels. Its corners lie at the centres of its outermost texels (0, 0), (T-1, 0), (0, T-1) and (T-1, T-1), as (column,
+// row). Its triangles have the corners (0, 1, 2) and (3, 2, 1); patches from `pairs` on have the first alone.
+struct PatchSet {
+  static constexpr uint32_t kMinPatchEdge = 8, kMaxPatchEdge = 32;
+  static constexpr uint32_t kMaxTextureEdge = 4096;         // texels, which every GPU supports
+  static constexpr uint32_t kFeatureTextures = 4;           // of two features each
+  static constexpr uint32_t kBc4Bytes = 8, kBc5Bytes = 16;  // of a block of 4×4 texels
 
-// The colour of features seen along a direction, whose evaluateHarmonics() these are: the decoder's output through a
-// sigmoid.
-std::array<float, 3> decodeColour(const std::vector<DenseLayer>& decoder,
-                                  const std::array<float, kMeshFeatures>& features,
-                                  const std::array<float, 16>& harmonics);
+  uint32_t patchEdge = 8;  // T, a multiple of 4
+  uint32_t patches = 0, pairs = 0;
+  // The number v of a vertex along an axis stands for origin + step · v, in scene units.
+  std::array<double, 3> origin{};
+  double step = 1;
+  std::vector<uint16_t> vertices;                    // [patches][4][3]
+  std::array<FeatureRange, kMeshFeatures> ranges{};  // of the features
+  // Textures in blocks, row by row: of features 2k and 2k + 1 in BC5, and of opacities in BC4. Patch p is in row
+  // p / patchesAcross() of patches, and in column p % patchesAcross().
+  std::array<std::vector<uint8_t>, kFeatureTextures> featureBlocks;
+  std::vector<uint8_t> opacityBlocks;
+  std::vector<DenseLayer> decoder;  // features and harmonics → … → 3
+
+  uint32_t triangles() const { return patches + pairs; }
+  uint32_t patchesAcross() const;  // the smallest number whose square is at least `patches`
+  uint32_t textureWidth() const { return patchesAcross() * patchEdge; }
+  uint32_t textureHeight() const;
+  uint64_t textureBlocks() const { return uint64_t{textureWidth()} * textureHeight() / 16; }
+  Vec3d corner(uint32_t patch, uint32_t number) const;
+};
+
+// Returns the largest number of patches that fit a texture.
+constexpr uint32_t maxPatches(uint32_t patchEdge) {
+  return (PatchSet::kMaxTextureEdge / patchEdge) * (PatchSet::kMaxTextureEdge / patchEdge);
+}
+
+// Mixes the texels of a patch at a column and a row in [0, T-1].
+MeshTexel mixTexels(const PatchSet& set, uint32_t patch, float column, float row);
+
+struct MeshContent {
+  bool isBackground = false;
+  uint32_t skyEdge = 0;      // R; 0: no sky
+  std::vector<uint8_t> sky;  // [6][R][R][3], the texels of CubeMapForward
+  std::vector<PatchSet> parts;
+
+  uint64_t triangles() const;
+};
+
+// Returns the colour of the sky in a direction; CHECKs that there is one.
+std::array<float, 3> skyColour(const MeshContent& content, const Vec3d& direction);
+
+// Returns the memory of a part in bytes without its network, of which only the numbers of patches and texels are read.
+uint64_t patchSetBytes(const PatchSet& set);
+// Returns the bytes that a content takes in memory, as counted by the budgets of renderers.
+uint64_t bytesInMemory(const MeshContent& content);
+
+// Implements Content::mismatchWith.
+std::optional<std::string> mismatchWithTileset(const MeshContent& content, const TileContent& declared);
 
 }  // namespace tessera

@@ -1,6 +1,7 @@
 #include "representations/mesh/train/config.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 
@@ -49,6 +50,8 @@ std::vector<ConfigField> MeshConfig::fields() {
       lossSetting(),
       lossParameterSetting(),
       opaqueLossSetting(),
+      finalShareSetting(),
+      patchTexelsSetting(),
       distortionWeightSetting().byDefault(0.02),
       depthWeightSetting(),
       depthToleranceSetting(),
@@ -82,6 +85,10 @@ uint32_t MeshConfig::levels() const {
   int levels = 1;
   while (levels < meshLevels && meshCells % (4 << levels) == 0 && meshCells >> levels >= kLeastCells) ++levels;
   return static_cast<uint32_t>(levels);
+}
+
+int64_t MeshConfig::stepsBeforeFinalStage(int64_t plannedSteps) const {
+  return plannedSteps - std::llround(static_cast<double>(plannedSteps) * finalShare);
 }
 
 OctahedraDomain MeshConfig::domain(const MeshPart& part, uint32_t level) const {

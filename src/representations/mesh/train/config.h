@@ -60,6 +60,11 @@ struct MeshConfig : BackgroundBlockSettings,
   SETTING(double, minCosine, 0.1, "min_cosine",
           "a vertex is moved as if no ray hit its faces at a flatter angle than this cosine", share());
   SETTING(bool, opaqueLoss, true, "opaque_loss", "the second loss, which makes surfaces opaque", anything());
+  SETTING(double, finalShare, 0.2, "final_share",
+          "share of the steps for the final stage, which trains through texels as they are baked; 0: none",
+          within(0, 0.9));
+  SETTING(int, patchTexels, 8, "patch_texels", "texels along the edge of a patch of two triangles",
+          within(8, 32).withDivisor(4, 0));
 
   MeshConfig();
   // In the order of config.toml.
@@ -71,6 +76,8 @@ struct MeshConfig : BackgroundBlockSettings,
   // The number of levels: meshLevels, or as many as have a multiple of 4 cells along an edge, at least 8.
   uint32_t levels() const;
   bool hasBackground() const { return backgroundBlock == "own"; }
+  // The number of steps before the final stage; 0 if the number of all is unknown.
+  int64_t stepsBeforeFinalStage(int64_t plannedSteps) const;
   OctahedraDomain domain(const MeshPart& part, uint32_t level) const;
 };
 

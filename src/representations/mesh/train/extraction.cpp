@@ -1,7 +1,6 @@
 #include "representations/mesh/train/extraction.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <numbers>
 
@@ -11,6 +10,8 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kExtractionSamples = 1 << 17;
+// The directions of parallel rays count only for faces that no photo shows.
+constexpr float kParallelWeight = 1e-4f;
 constexpr uint32_t kAzimuths = 8;
 constexpr double kElevations[] = {60, 45, 30};  // degrees above the horizon from which parallel rays come
 
@@ -26,7 +27,7 @@ class PhotoFaces final : public PixelVisitor {
   void visit(std::span<const float> pixels, SeenThrough) override {
     while (!pixels.empty()) {  // rays whose hits do not fit are followed in the next batch
       const ImageRays::Piece piece = imageRays_.through(pixels);
-      pixels = pixels.subspan(size_t{2} * marker_.mark({piece.rays, piece.origins, piece.directions, {}}));
+      pixels = pixels.subspan(size_t{2} * marker_.mark({piece.rays, piece.origins, piece.directions, {}}, 1));
     }
   }
 
@@ -47,7 +48,7 @@ void markParallel(Device& device, FaceMarker& marker, const Vec3d& direction, do
     while (!from.empty()) {
       const Array<float> o = device.uploadArray(std::vector<float>(from.begin(), from.end())),
                          d = device.uploadArray(std::vector<float>(along.begin(), along.end()));
-      const uint32_t followed = marker.mark({static_cast<uint32_t>(from.size() / 3), o, d, {}});
+      const uint32_t followed = marker.mark({static_cast<uint32_t>(from.size() / 3), o, d, {}}, kParallelWeight);
       from = from.subspan(size_t{3} * followed);
       along = along.subspan(size_t{3} * followed);
     }
@@ -69,12 +70,6 @@ void markParallel(Device& device, FaceMarker& marker, const Vec3d& direction, do
 
 }  // namespace
 
-size_t FaceSet::count() const {
-  size_t faces = 0;
-  for (const uint32_t word : bits_) faces += static_cast<size_t>(std::popcount(word));
-  return faces;
-}
-
 FaceMarker::FaceMarker(MeshModel& model, uint32_t level, const ExtractionSettings& settings)
     : model_(model),
       level_(level),
@@ -87,7 +82,7 @@ FaceMarker::FaceMarker(MeshModel& model, uint32_t level, const ExtractionSetting
   model.field().reserve(kExtractionSamples);
 }
 
-uint32_t FaceMarker::mark(const MeshRays& rays) {
+uint32_t FaceMarker::mark(const MeshRays& rays, float weight) {
   constexpr uint32_t kMaxHits = 1024;  // of a ray
   Device& device = model_.device();
   model_.level(level_).trace(rays, kMaxHits, false, hits_);
@@ -95,25 +90,45 @@ uint32_t FaceMarker::mark(const MeshRays& rays) {
   const std::vector<uint32_t> counters = device.read(counters_.all());
   const uint32_t followed = counters[1];
   CHECK(followed >= 1u);  // one ray's hits always fit
+  const std::vector<float> directions = device.read(rays.directions.part(0, size_t{3} * followed));
   const auto [first, faces, logits] = device.readAll(
       Slice<const uint32_t>(hits_.firstSample.part(0, followed + size_t{1})),
       Slice<const uint32_t>(hits_.faces.part(0, counters[0])), Slice<const float>(logits_.part(0, counters[0])));
   for (uint32_t ray = 0; ray < followed; ++ray) {
     float transmittance = 1;
+    const Vec3f direction = Vec3f(directions[3 * ray], directions[3 * ray + 1], directions[3 * ray + 2]).normalized();
     for (uint32_t i = first[ray]; i < first[ray + 1] && 1 - transmittance <= settings_.maxOpacity; ++i) {
       const float opacity = 1 / (1 + std::exp(-logits[i] - model_.opacityOffset()));
-      if (opacity >= settings_.minOpacity) faces_.add(faces[i]);
+      if (opacity >= settings_.minOpacity) faces_.add(faces[i], weight * transmittance * opacity * direction);
       transmittance *= 1 - opacity;
     }
   }
   return followed;
 }
 
-FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, const ExtractionSettings& settings,
-                     const std::function<void(int64_t, int64_t)>& onPhoto) {
+FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
+                     const ExtractionSettings& settings, const std::function<void(int64_t, int64_t)>& onPhoto) {
   FaceMarker marker(model, level, settings);
-  PhotoFaces photos(model, marker);
-  PhotoVisitor(capture, model.frame(), FaceMarker::kMaxRays, photos).visitAll(settings.photoStride, {}, onPhoto);
+  PhotoFaces faces(model, marker);
+  PhotoVisitor visitor(capture, model.frame(), FaceMarker::kMaxRays, faces);
+  if (tiles == nullptr) {
+    visitor.visitAll(settings.photoStride, {}, onPhoto);
+  } else {
+    const std::vector<int> photos = capture.photosIn(Split::train);
+    int64_t done = 0;
+    for (const int photo : photos) {
+      std::vector<PixelLattice> lattices;
+      for (const PhotoTile& tile : (*tiles)[photo].tiles) {
+        lattices.push_back({static_cast<int>(tile.left), static_cast<int>(tile.top), static_cast<int>(tile.right),
+                            static_cast<int>(tile.bottom), settings.photoStride});
+      }
+      if (!lattices.empty()) {
+        visitor.begin(photo);
+        visitor.look(lattices, SeenThrough::photo, false);
+      }
+      onPhoto(++done, static_cast<int64_t>(photos.size()));
+    }
+  }
   if (settings.raysPerCell > 0) {
     const double spacing = 2.0 / model.level(level).domain().grids[0].resolution / settings.raysPerCell;
     markParallel(model.device(), marker, -Vec3d::UnitZ(), spacing);

@@ -4,8 +4,10 @@
 
 #include <functional>
 
+#include "representations/mesh/train/face_set.h"
 #include "representations/mesh/train/mesh_model.h"
 #include "scene/capture.h"
+#include "train/photo_tiles.h"
 
 namespace tessera {
 
@@ -14,23 +16,7 @@ struct ExtractionSettings {
   float maxOpacity = 0.8f;  // accumulated opacity beyond which a ray sees no further face
   int photoStride = 1;      // every photoStride-th pixel of a photo, along both axes
   // Parallel rays: straight down, and from 8 directions each at 60°, 45° and 30° above the horizon; none with 0.
-  double raysPerCell = 4;  // along an edge of a cell
-};
-
-// Bits of faces, as TraceOctahedra::keptFaces.
-class FaceSet {
- public:
-  FaceSet() = default;
-  explicit FaceSet(OctahedraGrids grids) : bits_(faceWords(grids)) {}
-
-  void add(uint32_t face) { bits_[face / 32] |= 1u << face % 32; }
-  bool contains(uint32_t face) const { return (bits_[face / 32] >> face % 32 & 1) != 0; }
-  bool empty() const { return bits_.empty(); }
-  size_t count() const;
-  const std::vector<uint32_t>& bits() const { return bits_; }
-
- private:
-  std::vector<uint32_t> bits_;
+  double raysPerCell = 2;  // along an edge of a cell
 };
 
 // Marks the faces that rays see.
@@ -41,7 +27,8 @@ class FaceMarker {
 
   static constexpr uint32_t kMaxRays = 4096;
   // Follows the first rays of at most kMaxRays, as many as fit the buffers; returns their number, at least 1.
-  uint32_t mark(const MeshRays& rays);
+  // `weight`: of the rays' directions for the faces that they see.
+  uint32_t mark(const MeshRays& rays, float weight);
   const FaceSet& faces() const { return faces_; }
 
  private:
@@ -54,10 +41,12 @@ class FaceMarker {
   Array<float> logits_;
 };
 
-// Returns the faces of a level of a block that the training photos of `capture` and parallel rays see. Throws Error if
-// a mask cannot be read.
+// Returns the faces of a level of a block that the training photos of `capture` and parallel rays see. `tiles`:
+// [photo], the parts of the photos that are looked through; whole photos if it is null. Throws Error if a mask cannot
+// be read.
 FaceSet extractFaces(
-    MeshModel& model, uint32_t level, const Capture& capture, const ExtractionSettings& settings,
+    MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
+    const ExtractionSettings& settings,
     const std::function<void(int64_t done, int64_t all)>& onPhoto = [](int64_t, int64_t) {});
 
 }  // namespace tessera

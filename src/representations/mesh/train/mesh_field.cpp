@@ -35,6 +35,7 @@ void MeshField::reserve(uint32_t samples) {
   }
   for (Array<float>* rows : {&decoderInput_, &decoderInputGradients_}) *rows = device_.array<float>(n * inputs);
   colours_ = device_.array<float>(n * 3);
+  texelFeatures_ = device_.array<float>(n * kFeatures);
   encoderActivations_ = device_.allocateActivations(shape_.encoder, n);
   decoderActivations_ = device_.allocateActivations(shape_.decoder, n);
 }
@@ -89,6 +90,55 @@ void MeshField::backward(Count samples, Slice<const float> positions, Slice<cons
                           encodedGradients});
   device_.run(HashGridBackward{shape_.grid, samples, positions, table_.values, encodedGradients,
                                parameterGradients(table_), positionGradients});
+}
+
+void MeshField::encodeForBackward(Count texels, Slice<const float> positions) {
+  CHECK(texels.capacity <= capacity_);
+  device_.run(HashGridForward{shape_.grid, texels, positions, table_.values, byLevel(encoded_)});
+  device_.run(
+      MlpForward{shape_.encoder, texels, byLevel(encoded_), encoder_.values, encodedFeatures(), encoderActivations_});
+}
+
+void MeshField::encodeBackward(Count texels, Slice<const float> positions, Matrix<const float> featureGradients) {
+  const Matrix<float> encodedGradients = byLevel(encodedGradients_);
+  device_.run(MlpBackward{shape_.encoder,
+                          texels,
+                          byLevel(encoded_),
+                          encoder_.values,
+                          encodedFeatures(),
+                          encoderActivations_,
+                          featureGradients,
+                          {},
+                          encoder_.gradients,
+                          encodedGradients});
+  device_.run(HashGridBackward{shape_.grid, texels, positions, table_.values, encodedGradients, table_.gradients, {}});
+}
+
+Matrix<const float> MeshField::decode(Count hits, Slice<const float> directions, Slice<const uint32_t> rayOfHit) {
+  CHECK(hits.capacity <= capacity_);
+  const Matrix<float> input(decoderInput_, static_cast<uint32_t>(shape_.decoder.inputs));
+  const uint32_t harmonics = static_cast<uint32_t>(shape_.harmonicsDegree * shape_.harmonicsDegree);
+  device_.run(SphericalHarmonicsForward{shape_.harmonicsDegree, hits, directions, rayOfHit,
+                                        input.columnRange(kFeatures, harmonics)});
+  device_.run(
+      MlpForward{shape_.decoder, hits, input, decoder_.values, Matrix<float>(colours_, 3), decoderActivations_});
+  return Matrix<float>(colours_, 3);
+}
+
+Matrix<const float> MeshField::decodeBackward(Count hits, Matrix<const float> colourGradients) {
+  const uint32_t inputs = static_cast<uint32_t>(shape_.decoder.inputs);
+  const Matrix<float> inputGradients(decoderInputGradients_, inputs);
+  device_.run(MlpBackward{shape_.decoder,
+                          hits,
+                          Matrix<float>(decoderInput_, inputs),
+                          decoder_.values,
+                          Matrix<float>(colours_, 3),
+                          decoderActivations_,
+                          colourGradients,
+                          {},
+                          decoder_.gradients,
+                          inputGradients});
+  return inputGradients.columnRange(0, kFeatures);
 }
 
 }  // namespace tessera

@@ -46,6 +46,17 @@ class MeshField {
   void backward(Count samples, Slice<const float> positions, Slice<const float> logitGradients,
                 Matrix<const float> colourGradients, bool trains, Slice<float> positionGradients);
 
+  // The two networks apart, for texels that the encoder is evaluated at and hits that the decoder is evaluated at.
+  // `encodeForBackward` sets encodedFeatures(), [capacity][kFeatures]. Write decoderFeatures() before `decode`, which
+  // returns the colours. The backward functions add to the gradients of the parameter groups; `decodeBackward` returns
+  // those of decoderFeatures(). All are valid until the next call of another function.
+  void encodeForBackward(Count texels, Slice<const float> positions);
+  Matrix<float> encodedFeatures() { return Matrix<float>(texelFeatures_, kFeatures); }
+  void encodeBackward(Count texels, Slice<const float> positions, Matrix<const float> featureGradients);
+  Matrix<float> decoderFeatures() { return features(); }
+  Matrix<const float> decode(Count hits, Slice<const float> directions, Slice<const uint32_t> rayOfHit);
+  Matrix<const float> decodeBackward(Count hits, Matrix<const float> colourGradients);
+
   ParameterGroup& table() { return table_; }
   ParameterGroup& encoder() { return encoder_; }
   ParameterGroup& decoder() { return decoder_; }
@@ -64,6 +75,7 @@ class MeshField {
   Array<float> encoded_, encodedGradients_;  // [levels][Matrix::rowsOfPlane(capacity)][features]
   Array<float> decoderInput_;                // [capacity][features + harmonics]
   Array<float> colours_;                     // [capacity][3]
+  Array<float> texelFeatures_;               // [capacity][kFeatures]
   Array<float> encoderActivations_, decoderActivations_;
   Array<float> decoderInputGradients_;  // same shape as decoderInput_
 };

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "base/error.h"
 #include "compute/occupancy.h"
 
@@ -73,6 +75,38 @@ void MeshLevel::keepFaces(const std::vector<uint32_t>& bits) {
   keptFaces_ = device_.uploadArray(bits);
 }
 
+void MeshLevel::limitToFaces(const FaceSet& faces) {
+  keepFaces(faces.bits());
+  isLimited_ = true;
+  // A triangle lies in the smallest box of cells that contains its vertices.
+  const uint32_t n = domain_.grids[0].resolution, cells = domain_.grids[0].cells(), words = domain_.grids[0].words();
+  std::vector<uint32_t> traced(words * domain_.grids.size());
+  for (const uint32_t face : faces.numbers()) {
+    const uint32_t grid = face / kFacesPerCell / cells, cell = face / kFacesPerCell % cells;
+    const int place[3] = {static_cast<int>(cell % n), static_cast<int>(cell / n % n), static_cast<int>(cell / (n * n))};
+    int low[3] = {place[0] + 1, place[1] + 1, place[2] + 1}, high[3] = {place[0] - 1, place[1] - 1, place[2] - 1};
+    for (const auto& corner : octahedronFace(face % kFacesPerCell)) {
+      for (int axis = 0; axis < 3; ++axis) {
+        low[axis] = std::min(low[axis], place[axis] + corner[axis]);
+        high[axis] = std::max(high[axis], place[axis] + corner[axis]);
+      }
+    }
+    for (int k = low[2]; k <= high[2]; ++k)
+      for (int j = low[1]; j <= high[1]; ++j)
+        for (int i = low[0]; i <= high[0]; ++i) {
+          const uint32_t at = static_cast<uint32_t>(i) + n * (static_cast<uint32_t>(j) + n * static_cast<uint32_t>(k));
+          traced[words * grid + at / 32] |= 1u << at % 32;
+        }
+  }
+  device_.write(tracedCells_.all(), std::span<const uint32_t>(traced));
+}
+
+void MeshLevel::removeLimit() {
+  isLimited_ = false;
+  keepFaces({});
+  updateTracedCells();
+}
+
 void MeshLevel::backward(const MeshRays& rays, const MeshHits& hits, Slice<const float> positionGradients) {
   OctahedraBackward back{domain_.grids};
   back.samples = hits.samples();
@@ -115,6 +149,7 @@ void MeshLevel::refreshOccupancy(bool tracesNeighbours) {
 }
 
 void MeshLevel::updateTracedCells() {
+  if (isLimited_) return;
   std::vector<uint32_t> cells = occupancy_.bitWords();
   if (tracesNeighbours_) cells = dilateCells(cells, domain_.latticeCells());
   device_.write(tracedCells_.all(), std::span<const uint32_t>(domain_.toGrids(cells)));

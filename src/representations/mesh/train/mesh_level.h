@@ -4,6 +4,7 @@
 
 #include "compute/octahedra.h"
 #include "field/parameters.h"
+#include "representations/mesh/train/face_set.h"
 #include "representations/mesh/train/mesh_part.h"
 #include "train/occupancy_grid.h"
 
@@ -46,6 +47,11 @@ class MeshLevel {
   void trace(const MeshRays& rays, uint32_t maximum, bool inOwn, MeshHits& hits);
   // From now on, rays hit only these faces (bits, TraceOctahedra::keptFaces); all faces if empty.
   void keepFaces(const std::vector<uint32_t>& bits);
+  // From now on, rays hit only these faces, and all of each, whatever cells are occupied: occupancy plays no role any
+  // more.
+  void limitToFaces(const FaceSet& faces);
+  // Undoes limitToFaces.
+  void removeLimit();
   // Adds to the gradients of the vertices.
   void backward(const MeshRays& rays, const MeshHits& hits, Slice<const float> positionGradients);
 
@@ -80,6 +86,7 @@ class MeshLevel {
   bool tracesNeighbours_ = true;
   Array<uint32_t> tracedCells_;
   Array<uint32_t> keptFaces_;  // without elements: all faces are
+  bool isLimited_ = false;     // limitToFaces was called
 };
 
 }  // namespace tessera

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/error.h"
 #include "base/random.h"
 
 namespace tessera {
@@ -118,6 +119,51 @@ bool MeshModel::allFinite() {
 void MeshModel::save(TensorSet& tensors, bool withMoments) {
   for (const ParameterGroup* group : sharedGroups()) tensors.add(device_, *group, withMoments);
   for (const auto& level : levels_) level->save(tensors, withMoments);
+  if (!atlas_) return;
+  const std::vector<uint32_t> faces = atlas_->faces.numbers();
+  std::vector<float> directions;
+  for (const uint32_t face : faces) {
+    const Vec3f direction = atlas_->faces.direction(face);
+    directions.insert(directions.end(), direction.begin(), direction.end());
+  }
+  tensors.add("atlas.patch_edge", std::vector<uint32_t>{atlas_->patchEdge});
+  tensors.add("atlas.faces", faces);
+  tensors.add("atlas.directions", directions);
+  tensors.add("atlas.ranges", atlas_->ranges);
+}
+
+void MeshModel::setAtlas(MeshAtlas atlas) {
+  atlas_ = std::move(atlas);
+  level(0).limitToFaces(atlas_->faces);
+}
+
+void MeshModel::removeAtlas() {
+  atlas_.reset();
+  level(0).removeLimit();
+}
+
+void MeshModel::restoreAtlas(const fs::path& path, const Safetensors& file) {
+  const auto read = [&](const char* name, TensorType type) { return file.require(path, name, type); };
+  const auto edge = read("atlas.patch_edge", TensorType::u32).as<uint32_t>();
+  const auto faces = read("atlas.faces", TensorType::u32).as<uint32_t>();
+  const auto directions = read("atlas.directions", TensorType::f32).as<float>();
+  const auto ranges = read("atlas.ranges", TensorType::f32).as<float>();
+  const OctahedraDomain& domain = level(0).domain();
+  const uint64_t all = uint64_t{kFacesPerCell} * domain.grids[0].cells() * domain.grids.size();
+  const bool isValid = edge.size() == 1 && edge[0] >= 2 && edge[0] <= 64 && directions.size() == 3 * faces.size() &&
+                       ranges.size() == 2 * MeshField::kFeatures &&
+                       std::all_of(faces.begin(), faces.end(), [&](uint32_t face) { return face < all; });
+  if (!isValid) {
+    throw Error(path.string(), "tensors atlas.*", "do not belong to these settings",
+                "restore the config.toml that the checkpoint was trained with, or train again");
+  }
+  MeshAtlas atlas;
+  atlas.patchEdge = edge[0];
+  atlas.faces = FaceSet(domain.grids);
+  for (size_t i = 0; i < faces.size(); ++i)
+    atlas.faces.add(faces[i], Vec3f(directions[3 * i], directions[3 * i + 1], directions[3 * i + 2]));
+  atlas.ranges.assign(ranges.begin(), ranges.end());
+  setAtlas(std::move(atlas));
 }
 
 void MeshModel::restore(const fs::path& path, const Safetensors& file) {
@@ -128,6 +174,7 @@ void MeshModel::restore(const fs::path& path, const Safetensors& file) {
     levels_.push_back(makeLevel(levels(), std::vector<float>(countDisplacements(domain(levels())))));
     levels_.back()->restore(path, file);
   }
+  if (file.tensors.contains("atlas.patch_edge")) restoreAtlas(path, file);
 }
 
 }  // namespace tessera

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "representations/mesh/train/config.h"
 #include "representations/mesh/train/mesh_field.h"
@@ -10,6 +11,14 @@
 #include "representations/mesh/train/mesh_part.h"
 
 namespace tessera {
+
+// What the final stage of training fixes: the faces of the finest level that are drawn, and how their texels are
+// stored.
+struct MeshAtlas {
+  uint32_t patchEdge = 0;  // texels along the edge of a patch
+  FaceSet faces;
+  std::vector<float> ranges;  // of the features, [MeshField::kFeatures][2]
+};
 
 class MeshModel {
  public:
@@ -28,12 +37,17 @@ class MeshModel {
   const MeshPart& part() const { return part_; }
   const SceneFrame& frame() const { return part_.frame; }
   uint32_t maxLevels() const { return part_.isBackground() ? 1 : config_.levels(); }
+  // Nothing before the final stage. From then on, rays hit its faces alone.
+  const std::optional<MeshAtlas>& atlas() const { return atlas_; }
+  void setAtlas(MeshAtlas atlas);
+  void removeAtlas();
+
   // The cube map of the sky behind the outside, CubeMapForward::texels.
   static constexpr uint32_t kSkyResolution = 64;
   ParameterGroup& sky() { return sky_; }
   float opacityOffset() const { return static_cast<float>(config_.opacityOffset); }
 
-  // The state consists of the parameters (with moments for training) and of the levels that there are.
+  // The state consists of the parameters (with moments for training), the levels that there are, and the atlas.
   bool allFinite();
   void save(TensorSet& tensors, bool withMoments);
   void restore(const fs::path& path, const Safetensors& file);
@@ -43,6 +57,7 @@ class MeshModel {
   std::unique_ptr<MeshLevel> mergeLevel(uint32_t number, uint64_t seed);
   OctahedraDomain domain(uint32_t level) const { return config_.domain(part_, level); }
   std::vector<ParameterGroup*> sharedGroups();
+  void restoreAtlas(const fs::path& path, const Safetensors& file);
 
   Device& device_;
   MeshConfig config_;
@@ -50,6 +65,7 @@ class MeshModel {
   MeshField field_;
   ParameterGroup sky_;  // empty for a block
   std::vector<std::unique_ptr<MeshLevel>> levels_;
+  std::optional<MeshAtlas> atlas_;
 };
 
 }  // namespace tessera

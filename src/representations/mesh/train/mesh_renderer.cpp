@@ -25,6 +25,18 @@ void addBehind(RenderedView& view, const RenderedView& behind) {
   }
 }
 
+// Adds the sky, `colours`, behind a view, unless an opaque object is known to stand at the ray's end. Then the pixel is
+// opaque, and its depth is the mean of the hits'.
+void addSky(RenderedView& view, const ImageF& colours, const ImageF* opaqueDepth) {
+  for (size_t pixel = 0; pixel < view.opacity.pixels.size(); ++pixel) {
+    if (opaqueDepth != nullptr && std::isfinite(opaqueDepth->pixels[pixel])) continue;
+    float& opacity = view.opacity.pixels[pixel];
+    for (size_t c = 0; c < 3; ++c) view.colour.pixels[3 * pixel + c] += (1 - opacity) * colours.pixels[3 * pixel + c];
+    if (opacity > 0) view.depth.pixels[pixel] /= opacity;
+    opacity = 1;
+  }
+}
+
 }  // namespace
 
 MeshPartRenderer::MeshPartRenderer(MeshModel& model, uint32_t level)
@@ -71,6 +83,7 @@ RenderedView MeshPartRenderer::render(const Camera& camera, const Pose& worldFro
   imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
                    opaqueDepth);
   RenderedView view = makeEmptyView(camera);
+  skyColours_ = model_.part().isBackground() ? ImageF(camera.width, camera.height, 3) : ImageF();
   imageRays_.renderInPieces(kSamples, [&](const ImageRays::Piece& piece, size_t first) {
     const std::vector<uint32_t> counters = renderPiece(piece);
     const uint32_t finished = counters[1];
@@ -81,15 +94,12 @@ RenderedView MeshPartRenderer::render(const Camera& camera, const Pose& worldFro
     const std::vector<float> sky = device.read(sky_.part(0, size_t{finished} * 3));
     for (uint32_t ray = 0; ray < finished; ++ray) {
       const size_t pixel = first + ray;
-      // The sky makes the pixel opaque, unless an opaque object is known to stand at the ray's end.
-      const bool hasSky =
-          model_.part().isBackground() && (opaqueDepth == nullptr || !std::isfinite(opaqueDepth->pixels[pixel]));
-      const float skyShare = hasSky ? 1 - opacity[ray] : 0;
-      for (size_t c = 0; c < 3; ++c)
-        view.colour.pixels[3 * pixel + c] = colour[3 * ray + c] + skyShare * sky[3 * ray + c];
-      view.opacity.pixels[pixel] = hasSky ? 1 : opacity[ray];
-      const float seenDepth = hasSky ? depth[ray] / std::max(opacity[ray], 1e-6f) : depth[ray];
-      view.depth.pixels[pixel] = imageRays_.toViewDepth(ray, seenDepth);
+      for (size_t c = 0; c < 3; ++c) {
+        view.colour.pixels[3 * pixel + c] = colour[3 * ray + c];
+        if (!skyColours_.empty()) skyColours_.pixels[3 * pixel + c] = sky[3 * ray + c];
+      }
+      view.opacity.pixels[pixel] = opacity[ray];
+      view.depth.pixels[pixel] = imageRays_.toViewDepth(ray, depth[ray]);
     }
     return ImageRays::Rendered{finished, counters[0]};
   });
@@ -103,9 +113,11 @@ MeshRenderer::MeshRenderer(TrainedMesh& mesh) : mesh_(mesh) {
 RenderedView MeshRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   RenderedView view = makeEmptyView(camera);
   const auto add = [&](int block) {
-    for (size_t i = 0; i < parts_.size(); ++i)
-      if (mesh_.parts[i]->part().block == block)
-        addBehind(view, parts_[i]->render(camera, worldFromCamera, opaqueDepth));
+    for (size_t i = 0; i < parts_.size(); ++i) {
+      if (mesh_.parts[i]->part().block != block) continue;
+      addBehind(view, parts_[i]->render(camera, worldFromCamera, opaqueDepth));
+      if (!parts_[i]->skyColours().empty()) addSky(view, parts_[i]->skyColours(), opaqueDepth);
+    }
   };
   const Vec3d eye = mesh_.grid.inGrid(worldFromCamera.translation);
   for (const int block : mesh_.grid.frontToBack({eye.x(), eye.y()})) add(block);

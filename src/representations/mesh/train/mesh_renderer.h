@@ -8,7 +8,7 @@
 
 namespace tessera {
 
-// Renders one level of detail of a part: of a block, what lies within its walls; outside, the sky, too.
+// Renders one level of detail of a part: of a block, what lies within its walls.
 class MeshPartRenderer final : public ViewRenderer {
  public:
   // Keeps a reference to `model`.
@@ -16,6 +16,8 @@ class MeshPartRenderer final : public ViewRenderer {
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override { return model_.device().name(); }
+  // The colours of the sky behind the last view, of all pixels; empty for a block.
+  const ImageF& skyColours() const { return skyColours_; }
 
  private:
   // Renders the rays of a piece, as far as their hits fit; returns the numbers of hits and of these rays.
@@ -27,6 +29,7 @@ class MeshPartRenderer final : public ViewRenderer {
   MeshHits hits_;
   Array<uint32_t> counters_;
   Array<float> colour_, opacity_, depth_, weights_, sky_;
+  ImageF skyColours_;
 };
 
 // Renders the blocks, front to back, and what lies outside behind them.

@@ -64,7 +64,10 @@ SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse)
         sight.towards = (pose.rotation * *inCamera).normalized();
         const double opacity = *view.opacity.at(x, y), cosine = inCamera->normalized().z();
         sight.isSurface = opacity >= 0.5 && cosine > 0;
-        if (sight.isSurface) sight.distance = *view.depth.at(x, y) / opacity / cosine;
+        if (sight.isSurface) {
+          sight.distance = *view.depth.at(x, y) / opacity / cosine;
+          sight.pixelWidth = sight.distance / camera.focalX();
+        }
         sights_.push_back(sight);
       }
     }
@@ -114,6 +117,7 @@ MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& 
   if (part.isBackground() && std::find(start.cells.begin(), start.cells.end(), true) == start.cells.end())
     start.cells.front() = true;
 
+  std::vector<double> pixelWidths;
   start.tiles.resize(photoCount_);
   constexpr float kReach = static_cast<float>(1 + kBlockMargin / (1 - 2 * kBlockMargin));  // half of the margin
   for (const Sight& sight : sights_) {
@@ -131,6 +135,12 @@ MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& 
                           static_cast<double>(sight.tile.bottom - sight.tile.top);
     shares.until.push_back(shares.total() + pixels);
     shares.tiles.push_back(sight.tile);
+    if (sight.isSurface) pixelWidths.push_back(sight.pixelWidth * part.frame.scale);
+  }
+  if (!pixelWidths.empty()) {
+    const auto middle = pixelWidths.begin() + static_cast<ptrdiff_t>(pixelWidths.size() / 2);
+    std::nth_element(pixelWidths.begin(), middle, pixelWidths.end());
+    start.pixelWidth = *middle;
   }
   return start;
 }

@@ -12,6 +12,7 @@ namespace tessera {
 struct MeshStart {
   std::vector<bool> cells;        // [cells of the lattice] of the finest level
   std::vector<TileShares> tiles;  // [photo]; only training photos have some
+  double pixelWidth = 0;          // of a photo on the surfaces, the median, units of the part; 0: unknown
 
   // Nothing can be trained without both.
   bool isEmpty() const;
@@ -35,6 +36,7 @@ class SurfaceSurvey {
     Vec3d eye, towards;     // the camera's centre and the direction of the middle, unit
     double distance = 0;    // of the surface, in world units
     bool isSurface = true;  // else the sky
+    double pixelWidth = 0;  // on the surface, in world units
   };
 
   SceneFrame frame_;  // of the coarse field

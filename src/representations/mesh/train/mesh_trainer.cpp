@@ -6,6 +6,7 @@
 #include "base/random.h"
 #include "compute/composite.h"
 #include "compute/cube_map.h"
+#include "representations/mesh/train/extraction.h"
 #include "representations/mesh/train/mesh_schedule.h"
 
 namespace tessera {
@@ -20,6 +21,10 @@ constexpr uint32_t kRaysPerCoarseRay = 4;
 constexpr int64_t kUpdatesPerExploration = 8;
 constexpr float kMinTrainingTransmittance = 1e-4f;
 constexpr double kFinalVertexFactor = 0.01;
+// In the final stage, rays are drawn as squares of neighbouring pixels: their hits share texels, at which the encoder
+// is evaluated once.
+constexpr uint32_t kSquareOfRays = 2;
+constexpr double kFinalStageRate = 0.3;  // of the learning rate, at the beginning of the final stage
 // With `--minutes`, the number of steps is known only after a quarter of the time: until then the rate must not depend
 // on it.
 constexpr double kConstantVertexFraction = 0.3;
@@ -31,24 +36,35 @@ PhotoRays::Settings raySettings(const MeshConfig& config) {
   return settings;
 }
 
+// Returns the stride at which a cell has four rays along an edge, at least 1.
+int findPhotoStride(double pixelWidth, const OctahedraDomain& domain) {
+  constexpr double kRaysAcrossCell = 4, kMaxStride = 4;
+  if (pixelWidth <= 0) return 1;
+  const double cell = 1 / domain.grids[0].gridFromScene[0];
+  return static_cast<int>(std::clamp(cell / kRaysAcrossCell / pixelWidth, 1.0, kMaxStride));
+}
+
 }  // namespace
 
 MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfig& config, const MeshPart& part,
                          MeshStart start)
     : device_(device),
+      capture_(capture),
       config_(config),
       model_(device, config, part),
       photoRays_(device, capture, part.frame, raySettings(config)),
       photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config) {
   model_.level(0).exclude(start.cells);
+  tiles_ = start.tiles;
+  pixelWidth_ = start.pixelWidth;
   photoRays_.drawFrom(std::move(start.tiles));
   const uint32_t rays = static_cast<uint32_t>(config.maxRays);
   const uint32_t samples =  // at least one ray fits
       std::max(kCapacityPerDemand * static_cast<uint32_t>(config.samplesPerStep), kMaxTrainingHits);
   hits_ = MeshHits(device, rays, samples);
   const size_t levels = config.levels();
-  counters_ = device.array<uint32_t>(levels * MeshHits::kCounters);
+  counters_ = device.array<uint32_t>(levels * MeshHits::kCounters + AtlasStage::kCounters);
   model_.field().reserve(samples);
   for (Array<float>* perRay : {&opacity_, &opaqueOpacity_}) *perRay = device.array<float>(rays);
   for (Array<float>* perRay : {&colour_, &opaqueColour_, &skyColour_}) *perRay = device.array<float>(size_t{rays} * 3);
@@ -68,14 +84,73 @@ void MeshTrainer::refreshOccupancy(int64_t step) {
   }
 }
 
+bool MeshTrainer::isFinalStage(int64_t step, int64_t plannedSteps) const {
+  return plannedSteps > 0 && step >= config_.stepsBeforeFinalStage(plannedSteps);
+}
+
+void MeshTrainer::beginFinalStage() {
+  if (!model_.atlas()) {
+    ExtractionSettings extraction;
+    if (model_.part().isBackground()) {
+      extraction.raysPerCell = 0;
+    } else {
+      extraction.photoStride = findPhotoStride(pixelWidth_, model_.level(0).domain());
+    }
+    MeshAtlas atlas;
+    atlas.patchEdge = static_cast<uint32_t>(config_.patchTexels);
+    atlas.faces = extractFaces(model_, 0, capture_, &tiles_, extraction);
+    atlas.ranges = TexelAtlas(model_, atlas.faces, atlas.patchEdge).findRanges(model_);
+    model_.setAtlas(std::move(atlas));
+  }
+  constexpr uint32_t kTexelsPerHit = 4, kLeastHits = 256;
+  const uint32_t samples = static_cast<uint32_t>(config_.samplesPerStep);
+  finalStage_.emplace(model_, static_cast<uint32_t>(config_.maxRays),
+                      std::max(kLeastHits, kCapacityPerDemand * samples / kTexelsPerHit));
+}
+
+// Its rate falls, over the final stage, from kFinalStageRate to the final factor of the rate of all steps.
+StepReport MeshTrainer::finalStep(int64_t step, int64_t plannedSteps) {
+  if (!finalStage_) beginFinalStage();
+  photoRays_.draw(step, budget_.rays(), kSquareOfRays);
+  const Slice<uint32_t> counters = counters_.part(counters_.size() - AtlasStage::kCounters, AtlasStage::kCounters);
+  finalStage_->addGradients(photoRays_, photoLoss_, losses_.part(0, AtlasStage::kLosses), counters);
+  const int64_t first = config_.stepsBeforeFinalStage(plannedSteps);
+  const double done =
+      static_cast<double>(step - first) / static_cast<double>(std::max<int64_t>(1, plannedSteps - first));
+  updateNetworks(config_.learningRate * kFinalStageRate *
+                 std::pow(config_.finalLearningRateFactor / kFinalStageRate, done));
+
+  const auto [counts, losses] = device_.readAll(counters, losses_.part(0, AtlasStage::kLosses));
+  StepReport report;
+  report.samples = report.marched = counts[0];
+  report.rays = counts[1];
+  report.texels = counts[2];
+  report.loss = losses[0] + losses[PhotoLoss::kLosses];
+  double weight = 0;
+  for (uint32_t ray = 0; ray < report.rays; ++ray) weight += photoRays_.batch().weights[ray];
+  report.squaredError = losses[1] / std::max(1.0, 3 * weight);
+  double target = config_.samplesPerStep * static_cast<double>(report.rays) / std::max(1u, report.texels);
+  if (report.rays < photoRays_.count()) target = std::min<double>(target, report.rays);
+  constexpr double kRaysOfSquare = kSquareOfRays * kSquareOfRays;
+  budget_.aimFor(std::ceil(target / kRaysOfSquare) * kRaysOfSquare);
+  return report;
+}
+
 StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
+  if (isFinalStage(step, plannedSteps)) return finalStep(step, plannedSteps);
+  plannedSteps = config_.stepsBeforeFinalStage(plannedSteps);
+  if (model_.atlas()) {  // the training goes on beyond its former end
+    model_.removeAtlas();
+    finalStage_.reset();
+  }
   refreshOccupancy(step);
   if (MeshSchedule::period(step, plannedSteps) > 0 && model_.levels() == 1)
     model_.addCoarseLevels(mix64(static_cast<uint64_t>(config_.seed)));
   const uint32_t rays = budget_.rays();
   photoRays_.draw(step, rays);
   for (uint32_t level = 0; level < model_.levels(); ++level) addGradients(level, step, plannedSteps);
-  updateParameters(step, plannedSteps);
+  updateNetworks(config_.rateSchedule().at(step, plannedSteps));
+  if (movesVertices(step)) updateVertices(step, plannedSteps);
 
   // The step is over, so its counters may be read.
   const auto [counters, losses] = device_.readAll(counters_.all(), losses_.all());
@@ -235,9 +310,9 @@ void MeshTrainer::addOpaqueLoss(const Batch& batch, double weight, double thresh
   device_.run(back);
 }
 
-void MeshTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
+void MeshTrainer::updateNetworks(double rate) {
   Adam adam;
-  adam.rate = static_cast<float>(config_.rateSchedule().at(step, plannedSteps));
+  adam.rate = static_cast<float>(rate);
   adam.skipZeroGradients = true;
   model_.field().table().step(device_, adam);
   adam.skipZeroGradients = false;
@@ -249,18 +324,19 @@ void MeshTrainer::updateParameters(int64_t step, int64_t plannedSteps) {
     adam.skipZeroGradients = true;
     model_.sky().step(device_, adam);
   }
-  if (movesVertices(step)) {
-    RateSchedule schedule;
-    schedule.rate = config_.vertexLearningRate;
-    schedule.finalFactor = kFinalVertexFactor;
-    schedule.constantFraction = kConstantVertexFraction;
-    Adam vertices;
-    vertices.rate = static_cast<float>(schedule.at(step, plannedSteps));
-    vertices.skipZeroGradients = true;
-    vertices.bound = kMaxDisplacement;
-    for (uint32_t level = 0; level < model_.levels(); ++level)
-      model_.level(level).displacements().step(device_, vertices);
-  }
+}
+
+void MeshTrainer::updateVertices(int64_t step, int64_t steps) {
+  RateSchedule schedule;
+  schedule.rate = config_.vertexLearningRate;
+  schedule.finalFactor = kFinalVertexFactor;
+  schedule.constantFraction = kConstantVertexFraction;
+  Adam vertices;
+  vertices.rate = static_cast<float>(schedule.at(step, steps));
+  vertices.skipZeroGradients = true;
+  vertices.bound = kMaxDisplacement;
+  for (uint32_t level = 0; level < model_.levels(); ++level)
+    model_.level(level).displacements().step(device_, vertices);
 }
 
 Bytes MeshTrainer::save(uint32_t) {

@@ -1,6 +1,7 @@
 // One training step of a part of a mesh: rays → hits on octahedra → field → two images → losses → gradients → Adam.
 #pragma once
 
+#include "representations/mesh/train/atlas_stage.h"
 #include "representations/mesh/train/mesh_model.h"
 #include "representations/mesh/train/mesh_start.h"
 #include "train/photo_loss.h"
@@ -26,6 +27,10 @@ class MeshTrainer final : public TrainableModel {
 
  private:
   bool movesVertices(int64_t step) const { return step >= config_.vertexStartSteps && config_.vertexLearningRate > 0; }
+  // The final stage: its atlas is made before its first step.
+  bool isFinalStage(int64_t step, int64_t plannedSteps) const;
+  void beginFinalStage();
+  StepReport finalStep(int64_t step, int64_t plannedSteps);
   void refreshOccupancy(int64_t step);
   // Adds the gradients of a level of detail: of the networks and the vertices for the finest, of the vertices alone for
   // the others, which use a part of the rays.
@@ -42,9 +47,11 @@ class MeshTrainer final : public TrainableModel {
   // hits stand before the sky, and there is no second loss.
   void addVolumeLoss(const Batch& batch, double weight);
   void addOpaqueLoss(const Batch& batch, double weight, double threshold);
-  void updateParameters(int64_t step, int64_t plannedSteps);
+  void updateNetworks(double rate);
+  void updateVertices(int64_t step, int64_t steps);
 
   Device& device_;
+  const Capture& capture_;
   MeshConfig config_;
   MeshModel model_;
   PhotoRays photoRays_;
@@ -55,6 +62,9 @@ class MeshTrainer final : public TrainableModel {
   Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, skyColour_, losses_;
   Array<float> sampleWeights_, sampleSteps_, weightGradients_, logitGradients_, sampleColourGradients_,
       positionGradients_;
+  std::vector<TileShares> tiles_;  // [photo]
+  double pixelWidth_ = 0;          // MeshStart::pixelWidth
+  std::optional<AtlasStage> finalStage_;
 };
 
 }  // namespace tessera

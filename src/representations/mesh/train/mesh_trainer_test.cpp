@@ -97,7 +97,9 @@ TEST(MeshTrainer, TrainsCoarseLevelsThatChangeNothingElse) {
 
 TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   const CubeScene scene;
-  CubeTraining trained(scene, smallMeshConfig(), 400);
+  MeshConfig config = smallMeshConfig();
+  config.finalShare = 0;
+  CubeTraining trained(scene, config, 400);
   MeshModel& model = trained.trainer->model();
   const double before = heldOutPsnr(scene, model);
   ExtractionSettings few;
@@ -107,9 +109,9 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   photos.photoStride = 1;
   ExtractionSettings all = photos;
   all.raysPerCell = 2;
-  const FaceSet some = extractFaces(model, 0, scene.capture(), few),
-                most = extractFaces(model, 0, scene.capture(), photos),
-                faces = extractFaces(model, 0, scene.capture(), all);
+  const FaceSet some = extractFaces(model, 0, scene.capture(), nullptr, few),
+                most = extractFaces(model, 0, scene.capture(), nullptr, photos),
+                faces = extractFaces(model, 0, scene.capture(), nullptr, all);
   EXPECT_GT(some.count(), 50u);
   EXPECT_LT(some.count(), most.count());
   EXPECT_LT(most.count(), faces.count());
@@ -128,9 +130,11 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
 
 TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {
   const CubeScene scene;
-  MeshConfig still = smallMeshConfig();
+  MeshConfig moving = smallMeshConfig();
+  moving.finalShare = 0;
+  MeshConfig still = moving;
   still.vertexLearningRate = 0;
-  CubeTraining moved(scene, smallMeshConfig(), 400), unmoved(scene, still, 400);
+  CubeTraining moved(scene, moving, 400), unmoved(scene, still, 400);
   EXPECT_GT(heldOutPsnr(scene, moved.trainer->model()), heldOutPsnr(scene, unmoved.trainer->model()));
   double largest = 0;
   for (const float d : moved.device->read(moved.trainer->model().level(0).displacements().values.all()))

@@ -163,14 +163,21 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
   const std::vector<MeshPart> parts = makeMeshParts(run.grid, config.hasBackground());
   requireParts(options.only, parts);
   if (!run.goesOn) {
-    fs::remove_all(model / "parts");
+    // Models of a former run, and nothing else that may be in the folder.
+    const auto removeModel = [](const ModelFolder& folder) {
+      if (fs::exists(folder.root() / "manifest.json")) fs::remove_all(folder.root());
+    };
+    for (const MeshPart& part : parts) removeModel(partFolder(model, part));
+    if (!options.loop.resume) removeModel(coarseFolder(model));
     if (!options.loop.resume) fs::remove(model / "run.json");
-    if (!options.loop.resume) fs::remove_all(model / "coarse");
+    keepLength(model, options.loop);
     writeFileAtomically(run.folder.configPath(), reproductionHeader(device, options.loop, " --grid blocks.json") +
                                                      configToToml(config.fields()));
     run.folder.writePlacement({{}, run.grid, capture.sourceFromWorld, capture.root, trainingNames(capture)}, "mesh");
+    writeMeshManifest(model, parts);  // from now on, --resume takes settings and blocks from this folder
+  } else {
+    keepLength(model, options.loop);
   }
-  keepLength(model, options.loop);
   if (!trainCoarseField(device, capture, model, options)) return {};
   writeMeshManifest(model, parts);
   const auto isRequested = [&](const std::string& name) {

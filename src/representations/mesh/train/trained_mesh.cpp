@@ -28,7 +28,8 @@ TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder) {
 void writeMeshManifest(const fs::path& folder, const std::vector<MeshPart>& parts) {
   ModelManifest sum;
   sum.method = "mesh";
-  sum.files = {"coarse/manifest.json"};
+  // A manifest names files that exist.
+  sum.files = {coarseFolder(folder).manifest() ? "coarse/manifest.json" : "blocks.json"};
   bool isPlanned = true;
   for (const MeshPart& part : parts) {
     const std::optional<ModelManifest> manifest = partFolder(folder, part).manifest();

@@ -1,7 +1,7 @@
 // Fuzzes the decoder of volume contents: memory stays bounded, and accepted contents keep the rules and survive
 // re-encoding.
-#include "raymarch/testing/content_fuzz.h"
 #include "representations/volume/content/volume_payload.h"
+#include "tiles/testing/content_fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
   using namespace tessera;

@@ -1,4 +1,4 @@
-// Decodes hash contents. The bytes are untrusted. docs/tile-format.md, sections 5, 7 and 10.
+// Decodes hash contents. The bytes are untrusted. docs/tile-format.md, sections 5, 7 and 11.
 import { count, emptyTextures, kAttributes, putCube, type ContentPart, type Cubes, type MarchedHeader } from '../../raymarch/content';
 import { countTextures } from '../../raymarch/content-layout';
 import { mismatchWithTileset, ruleOfParts } from '../../raymarch/content-rules';

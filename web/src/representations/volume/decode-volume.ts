@@ -1,4 +1,4 @@
-// Decodes volume contents. The bytes are untrusted. docs/tile-format.md, sections 5, 6 and 10.
+// Decodes volume contents. The bytes are untrusted. docs/tile-format.md, sections 5, 6 and 11.
 import { count, emptyTextures, putCube, type Cubes, type MarchedHeader } from '../../raymarch/content';
 import { countTextures } from '../../raymarch/content-layout';
 import { mismatchWithTileset, ruleOfParts } from '../../raymarch/content-rules';

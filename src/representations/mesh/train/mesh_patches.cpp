@@ -1,4 +1,4 @@
-#include "representations/mesh/bake/mesh_patches.h"
+#include "representations/mesh/train/mesh_patches.h"
 
 #include <algorithm>
 #include <cmath>
@@ -61,6 +61,7 @@ TriangleList listTriangles(OctahedraGrids grids, OctahedraGrids owners, const st
       }
       list.triangles.push_back(triangle);
       list.gridOfTriangle.push_back(g);
+      list.faceOfTriangle.push_back(face);
     }
   }
   return list;
@@ -118,6 +119,7 @@ std::vector<TrianglePatch> pairTriangles(const TriangleList& list) {
     const auto& t = list.triangles[a.triangle];
     TrianglePatch patch;
     patch.corners = {t[a.apex], t[(a.apex + 1) % 3], t[(a.apex + 2) % 3], list.triangles[b.triangle][b.apex]};
+    patch.triangles = {a.triangle, b.triangle};
     patch.grid = list.gridOfTriangle[a.triangle];
     patch.isPair = true;
     patches.push_back(patch);
@@ -125,7 +127,7 @@ std::vector<TrianglePatch> pairTriangles(const TriangleList& list) {
   for (uint32_t triangle = 0; triangle < count; ++triangle) {
     if (isTaken[triangle]) continue;
     const auto& t = list.triangles[triangle];
-    patches.push_back({{t[0], t[1], t[2], t[0]}, list.gridOfTriangle[triangle], false});
+    patches.push_back({{t[0], t[1], t[2], t[0]}, {triangle, triangle}, list.gridOfTriangle[triangle], false});
   }
   return patches;
 }
@@ -134,6 +136,18 @@ Vec3d texelPosition(const std::array<Vec3d, 4>& corners, bool isPair, double col
   const double u = column / (patchEdge - 1), v = row / (patchEdge - 1);
   if (u + v <= 1 || !isPair) return corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
   return corners[3] + (1 - u) * (corners[2] - corners[3]) + (1 - v) * (corners[1] - corners[3]);
+}
+
+void toFieldPosition(const OctahedraGrid& grid, const Vec3d& point, float* position) {
+  double g[4];
+  for (size_t row = 0; row < 4; ++row) {
+    const float* const m = grid.gridFromScene.data() + 4 * row;
+    g[row] = double{m[0]} * point.x() + double{m[1]} * point.y() + double{m[2]} * point.z() + m[3];
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const double at = (g[axis] / g[3] + grid.positionOffset[axis]) * grid.positionScale();
+    position[axis] = static_cast<float>(std::clamp(at, 0.0, 1.0));
+  }
 }
 
 }  // namespace tessera

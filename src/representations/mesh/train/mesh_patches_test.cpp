@@ -1,4 +1,4 @@
-#include "representations/mesh/bake/mesh_patches.h"
+#include "representations/mesh/train/mesh_patches.h"
 
 #include <gtest/gtest.h>
 

@@ -16,6 +16,7 @@ struct TriangleList {
   std::vector<Vec3d> vertices;
   std::vector<std::array<uint32_t, 3>> triangles;  // indices of vertices
   std::vector<uint32_t> gridOfTriangle;
+  std::vector<uint32_t> faceOfTriangle;  // numbers of faces (compute/octahedra.h)
 };
 
 // Returns those of the given faces (bits of face numbers, TraceOctahedra::keptFaces) that exist and whose centre lies
@@ -26,7 +27,8 @@ TriangleList listTriangles(OctahedraGrids grids, OctahedraGrids owners, const st
 
 // Corners in the order of MeshContent: (0, 1, 2) is the first triangle, (3, 2, 1) the second.
 struct TrianglePatch {
-  std::array<uint32_t, 4> corners{};  // indices of vertices; without a second triangle the last one is unused
+  std::array<uint32_t, 4> corners{};    // indices of vertices; without a second triangle the last one is unused
+  std::array<uint32_t, 2> triangles{};  // the first one, and the second one if there is one
   uint32_t grid = 0;
   bool isPair = false;
 };
@@ -37,5 +39,8 @@ std::vector<TrianglePatch> pairTriangles(const TriangleList& list);
 // The position in the scene of a texel of a patch, which continues the first triangle's plane where there is no second
 // one. `column`, `row`: in units of texels, T - 1 at the last.
 Vec3d texelPosition(const std::array<Vec3d, 4>& corners, bool isPair, double column, double row, uint32_t patchEdge);
+
+// Writes the position in the field, 3 numbers in [0, 1], of a point of the part's frame.
+void toFieldPosition(const OctahedraGrid& grid, const Vec3d& point, float* position);
 
 }  // namespace tessera

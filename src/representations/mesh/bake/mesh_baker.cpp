@@ -1,0 +1,264 @@
+#include "representations/mesh/bake/mesh_baker.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <map>
+#include <numbers>
+
+#include "bake/levels.h"
+#include "base/check.h"
+#include "base/image_io.h"
+#include "representations/mesh/content/fallback_mesh.h"
+#include "representations/mesh/content/mesh_payload.h"
+
+namespace tessera {
+namespace {
+
+constexpr uint32_t kCellsPerTile = 32;
+constexpr const char* kPng = "image/png";
+constexpr int kExhaustiveFromEffort = 7;
+
+// A content under way: the parts that have been added, and the textures of its ordinary mesh.
+struct GrowingContent {
+  MeshContent content;
+  std::vector<ImageU8> textures;  // of each part; empty without an ordinary mesh
+  SceneBox box{Vec3d::Constant(INFINITY), Vec3d::Constant(-INFINITY)};
+  uint32_t blocksToCome = 0;
+
+  void include(const PatchSet& part) {
+    for (uint32_t patch = 0; patch < part.patches; ++patch)
+      for (uint32_t number = 0; number < (patch < part.pairs ? 4u : 3u); ++number) {
+        box.low = box.low.cwiseMin(part.corner(patch, number));
+        box.high = box.high.cwiseMax(part.corner(patch, number));
+      }
+  }
+};
+
+class MeshBaker final : public Baker {
+ public:
+  MeshBaker(TrainedMesh mesh, const MeshSceneSettings& settings) : mesh_(std::move(mesh)), settings_(settings) {
+    const MeshConfig& config = mesh_.parts.front()->config();
+    if (settings_.patchEdge == 0) settings_.patchEdge = static_cast<uint32_t>(config.patchTexels);
+    tilesPerBlock_ = settings.tilesPerBlock > 0
+                         ? settings.tilesPerBlock
+                         : std::clamp(std::bit_floor(static_cast<uint32_t>(config.meshCells) / kCellsPerTile), 1u,
+                                      kMaxTilesPerBlock);
+    grid_ = mesh_.grid;
+    grid_.edge /= tilesPerBlock_;
+    grid_.columns *= static_cast<int>(tilesPerBlock_);
+    grid_.rows *= static_cast<int>(tilesPerBlock_);
+  }
+
+  SceneDescription description() const override {
+    return {kMeshName, grid_, mesh_.parts.front()->config().near * tilesPerBlock_, kHazySky};
+  }
+
+  void bake(const Capture& capture, const BakeOptions& options, ContentSink& sink) override {
+    options_ = options;
+    sink_ = &sink;
+    placeOn(frame_, grid_);
+    frame_.georeference = capture.geo;
+    levels_ = 1;
+    for (const auto& part : mesh_.parts) levels_ = std::max(levels_, part->levels());
+    photosToCome_ = static_cast<int64_t>(capture.photosIn(Split::train).size());
+    passes_ = 0;
+    for (const auto& part : mesh_.parts)
+      passes_ += (part->part().isBackground() ? 1 : levels_) - (part->atlas() ? 1 : 0);
+    for (uint32_t level = 0; level < levels_; ++level) bakeLevel(capture, level);
+    for (const auto& part : mesh_.parts)
+      if (part->part().isBackground()) bakeBackground(capture, *part);
+  }
+
+ private:
+  // The blocks of a level, in tiles of cells of the scene's grid, which are pieces of a block or groups of blocks.
+  void bakeLevel(const Capture& capture, uint32_t level) {
+    const LevelGroups groups =
+        groupsOfLevel(static_cast<uint32_t>(grid_.columns), static_cast<uint32_t>(grid_.rows), level, false);
+    std::map<uint32_t, GrowingContent> growing;  // by group
+    for (size_t group = 0; group < groups.cells.size(); ++group) {
+      const CellRange& cells = groups.cells[group];
+      const auto blocksAlong = [&](int axis) {
+        return (cells.end[axis] + tilesPerBlock_ - 1) / tilesPerBlock_ - cells.first[axis] / tilesPerBlock_;
+      };
+      growing[static_cast<uint32_t>(group)].blocksToCome = blocksAlong(0) * blocksAlong(1);
+    }
+    for (int block = 0; block < mesh_.grid.cells(); ++block) {
+      std::map<uint32_t, std::vector<uint32_t>> patchesOfGroup;
+      const std::vector<uint32_t> groupsOfBlock = findGroups(groups, block);
+      for (const uint32_t group : groupsOfBlock) patchesOfGroup[group];
+      const auto part = std::find_if(mesh_.parts.begin(), mesh_.parts.end(),
+                                     [&](const auto& each) { return each->part().block == block; });
+      if (part != mesh_.parts.end()) {
+        MeshModel& model = **part;
+        const BakedPatches baked = bakePart(capture, model, std::min(level, model.levels() - 1), level);
+        for (uint32_t patch = 0; patch < baked.patches(); ++patch) {
+          const Vec3d at = sceneFromPart(model) * baked.centre(patch);
+          patchesOfGroup[groupAt(groups, block, at)].push_back(patch);
+        }
+        for (auto& [group, patches] : patchesOfGroup) addPatches(baked, patches, sceneFromPart(model), growing[group]);
+      }
+      for (const uint32_t group : groupsOfBlock) {
+        if (--growing[group].blocksToCome > 0) continue;
+        finish(level, groups.cells[group], growing[group]);
+        growing.erase(group);
+      }
+    }
+  }
+
+  void bakeBackground(const Capture& capture, MeshModel& model) {
+    const BakedPatches baked = bakePart(capture, model, 0, 0);
+    GrowingContent growing;
+    growing.content.isBackground = true;
+    growing.content.skyEdge = MeshModel::kSkyResolution;
+    for (const float number : model.device().read(model.sky().values.all()))
+      growing.content.sky.push_back(FeatureRange{0, 1}.encode(number));
+    // Far triangles are larger: sets of similar distances, so that the steps of positions suit all of them.
+    std::map<int, std::vector<uint32_t>> byDistance;
+    for (uint32_t patch = 0; patch < baked.patches(); ++patch) {
+      Vec3d x = baked.centre(patch);
+      for (int axis = 0; axis < 3; ++axis) x[axis] /= model.part().halfEdges[axis];
+      byDistance[static_cast<int>(std::floor(std::log2(std::max(1.0, x.cwiseAbs().maxCoeff()))))].push_back(patch);
+    }
+    for (const auto& [octave, patches] : byDistance) addPatches(baked, patches, sceneFromPart(model), growing);
+    finish(0, std::nullopt, growing);
+  }
+
+  BakedPatches bakePart(const Capture& capture, MeshModel& model, uint32_t modelLevel, uint32_t sceneLevel) {
+    MeshBakeSettings settings;
+    settings.patchEdge = settings_.patchEdge;
+    settings.baseColours = settings_.fallback;
+    if (const auto& atlas = model.atlas(); atlas && modelLevel == 0) {  // as it was trained
+      return bakePatches(model, 0, atlas->faces, settings);
+    }
+    ExtractionSettings extraction;
+    extraction.photoStride = options_.stride << sceneLevel;
+    if (model.part().isBackground()) extraction.raysPerCell = 0;
+    const FaceSet faces = extractFaces(model, modelLevel, capture, nullptr, extraction, [this](int64_t done, int64_t) {
+      options_.onPhoto(passesDone_ * photosToCome_ + done, passes_ * photosToCome_);
+    });
+    ++passesDone_;
+    return bakePatches(model, modelLevel, faces, settings);
+  }
+
+  SceneFromPart sceneFromPart(const MeshModel& model) const {
+    const SceneFrame& frame = model.frame();
+    return {1 / (frame.scale * frame_.worldFromScene.scale), frame_.worldFromScene.undo(frame.centre)};
+  }
+
+  // The groups that lie in a block, or that contain it.
+  std::vector<uint32_t> findGroups(const LevelGroups& groups, int block) const {
+    std::vector<uint32_t> all;
+    for (uint32_t j = 0; j < tilesPerBlock_; ++j)
+      for (uint32_t i = 0; i < tilesPerBlock_; ++i) all.push_back(groupOfTile(groups, block, i, j));
+    std::sort(all.begin(), all.end());
+    all.erase(std::unique(all.begin(), all.end()), all.end());
+    return all;
+  }
+  uint32_t groupOfTile(const LevelGroups& groups, int block, uint32_t i, uint32_t j) const {
+    const uint32_t columns = static_cast<uint32_t>(mesh_.grid.columns), at = static_cast<uint32_t>(block);
+    const uint32_t column = at % columns * tilesPerBlock_ + i, row = at / columns * tilesPerBlock_ + j;
+    return groups.groupOfBlock[column + static_cast<uint32_t>(grid_.columns) * row];
+  }
+  // The group of a point in a block; points beyond its walls count as at the wall.
+  uint32_t groupAt(const LevelGroups& groups, int block, const Vec3d& xInScene) const {
+    const int columns = mesh_.grid.columns, tiles = static_cast<int>(tilesPerBlock_);
+    const auto tile = [&](double at, int cells, int first) {
+      return static_cast<uint32_t>(std::clamp(static_cast<int>(std::floor((at + cells) / 2)) - first, 0, tiles - 1));
+    };
+    return groupOfTile(groups, block, tile(xInScene.x(), grid_.columns, block % columns * tiles),
+                       tile(xInScene.y(), grid_.rows, block / columns * tiles));
+  }
+
+  // Adds the patches as one part, or several if they do not fit one.
+  void addPatches(const BakedPatches& baked, const std::vector<uint32_t>& patches, const SceneFromPart& placement,
+                  GrowingContent& to) const {
+    const Bc4Effort effort = options_.effort >= kExhaustiveFromEffort ? Bc4Effort::exhaustive : Bc4Effort::fast;
+    const size_t most = maxPatches(baked.patchEdge);
+    for (size_t first = 0; first < patches.size(); first += most) {
+      const auto some = std::span(patches).subspan(first, std::min(most, patches.size() - first));
+      const PatchSet& part = to.content.parts.emplace_back(compressPatches(baked, some, placement, effort));
+      to.include(part);
+      if (settings_.fallback) to.textures.push_back(makeBaseColourTexture(baked, some, part));
+    }
+  }
+
+  void finish(uint32_t level, const std::optional<CellRange>& cells, GrowingContent& growing) const {
+    MeshContent& content = growing.content;
+    ContentSummary summary;
+    if (content.parts.empty()) {  // a place without triangles
+      content.parts.push_back(emptyPart());
+      growing.textures.clear();
+    }
+    summary.isBackground = content.isBackground;
+    const SceneBox around = cells ? frame_.boxFromCells(*cells) : frame_.box();
+    if (growing.box.low.x() <= growing.box.high.x()) {
+      constexpr double kLeastExtent = 1e-6;  // flat boxes are invalid
+      summary.box.low = growing.box.low - Vec3d::Constant(kLeastExtent);
+      summary.box.high = growing.box.high + Vec3d::Constant(kLeastExtent);
+    } else {
+      summary.box = around;
+    }
+    if (!cells) {  // the far box contains the scene's
+      summary.box.low = summary.box.low.cwiseMin(around.low);
+      summary.box.high = summary.box.high.cwiseMax(around.high);
+    }
+    summary.geometricError = texelEdge(level, content.isBackground);
+    summary.memoryBytes = bytesInMemory(content);
+    uint64_t patches = 0, textureBytes = 0;
+    for (const PatchSet& part : content.parts) patches += part.patches;
+    ContentFileWriter file;
+    FallbackMesh fallback(file, frame_.tileFromScene());
+    for (size_t i = 0; i < growing.textures.size(); ++i) {
+      const Bytes png = encodePng(growing.textures[i]);
+      const uint32_t resource = sink_->addResource(textureName(level, cells, i), kPng, png);
+      textureBytes += png.size();
+      fallback.add(content.parts[i], "../../" + sink_->resourceUri(resource));
+    }
+    summary.counts = {{"triangles", content.triangles()}, {"patches", patches}, {"fallback_bytes", textureBytes}};
+    sink_->add(level, cells, encodeMesh(content, std::move(file), fallback.scene()), summary);
+  }
+
+  static std::string textureName(uint32_t level, const std::optional<CellRange>& cells, size_t part) {
+    if (!cells) return fmt::format("L{}_background_block_{}", level, part);
+    return fmt::format("L{}_block_{}_{}_{}", level, cells->first[0], cells->first[1], part);
+  }
+
+  // A part without patches, with a network that fits.
+  static PatchSet emptyPart() {
+    PatchSet part;
+    DenseLayer layer{kMeshFeatures + kMeshHarmonics, 3, {}, {}};
+    layer.weights.resize(size_t{layer.inputs} * 3);
+    layer.biases.resize(3);
+    part.decoder = {layer};
+    return part;
+  }
+
+  // The distance between texels on the longest edge of a triangle, in scene units.
+  double texelEdge(uint32_t level, bool isBackground) const {
+    const MeshConfig& config = mesh_.parts.front()->config();
+    const double region = std::max({2.0 * grid_.columns, 2.0 * grid_.rows, frame_.top - frame_.bottom});
+    const double cell = isBackground ? region / config.backgroundCells
+                                     : 2.0 * tilesPerBlock_ / (1 - 2 * kBlockMargin) / (config.meshCells >> level);
+    return std::numbers::sqrt2 * cell / (settings_.patchEdge - 1);
+  }
+
+  TrainedMesh mesh_;
+  MeshSceneSettings settings_;
+  uint32_t tilesPerBlock_ = 1, levels_ = 1;
+  BlockGrid grid_;  // of tiles
+  Tileset frame_;   // only its frames and its grid
+  BakeOptions options_;
+  ContentSink* sink_ = nullptr;
+  int64_t photosToCome_ = 0, passes_ = 0, passesDone_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<Baker> makeMeshBaker(TrainedMesh mesh, const MeshSceneSettings& settings) {
+  return std::make_unique<MeshBaker>(std::move(mesh), settings);
+}
+
+}  // namespace tessera

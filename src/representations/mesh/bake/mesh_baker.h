@@ -1,0 +1,22 @@
+// Bakes a trained mesh to the contents of a scene.
+#pragma once
+
+#include <memory>
+
+#include "bake/baker.h"
+#include "representations/mesh/bake/bake_mesh.h"
+#include "representations/mesh/train/trained_mesh.h"
+
+namespace tessera {
+
+inline constexpr uint32_t kMaxTilesPerBlock = 16;
+
+struct MeshSceneSettings {
+  uint32_t patchEdge = 0;      // texels along the edge of a patch: 8 to 32, a multiple of 4; 0: as trained
+  uint32_t tilesPerBlock = 0;  // along an edge, at the finest level: a power of two; 0: one for each 32 cells
+  bool fallback = true;        // every content has an ordinary mesh for other programs
+};
+
+std::unique_ptr<Baker> makeMeshBaker(TrainedMesh mesh, const MeshSceneSettings& settings);
+
+}  // namespace tessera

@@ -1,0 +1,134 @@
+#include "representations/mesh/bake/mesh_baker.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "base/image_io.h"
+#include "render/cpu/scene_renderer.h"
+#include "render/tile_scene.h"
+#include "representations/mesh/content/mesh_payload.h"
+#include "representations/mesh/cpu/mesh_drawer.h"
+#include "representations/mesh/testing/small_mesh.h"
+#include "representations/mesh/train/mesh_renderer.h"
+#include "representations/mesh/train/train_mesh.h"
+#include "tiles/glb.h"
+#include "tiles/scene_folder.h"
+#include "train/testing/cube_scene.h"
+
+namespace tessera {
+namespace {
+
+// A cube in front of walls, trained for a moment in 2 × 1 blocks with background, once for all tests.
+class BakeMeshScene : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    CubeScene::Options enclosed;
+    enclosed.isEnclosed = true;
+    cube_ = std::make_unique<CubeScene>(enclosed);
+    device_ = makeDevice({"cpu", 2});
+    TrainMeshOptions options;
+    options.config = smallMeshConfig();
+    options.config.meshCells = 16;
+    options.config.meshLevels = 2;
+    options.blocks = {false, 2, 1};
+    options.loop.steps = 300;
+    options.loop.progress = false;
+    options.loop.checkpointSeconds = 1e6;
+    ASSERT_TRUE(trainMesh(*device_, cube_->capture(), model(), options).finished);
+  }
+  static void TearDownTestSuite() {
+    cube_.reset();
+    device_.reset();
+  }
+
+  static fs::path model() { return *cube_ / "model"; }
+  static BakedScene bake(const std::string& name, const MeshSceneSettings& settings) {
+    const auto baker = makeMeshBaker(loadTrainedMesh(*device_, model()), settings);
+    return bakeScene(*baker, cube_->capture(), *cube_ / name, {});
+  }
+  static std::unique_ptr<SceneRenderer> open(const std::string& name, int finestLevel = 0) {
+    TileScene scene = openTileScene(*cube_ / name, meshCodec());
+    SceneRendererSettings settings;
+    settings.selection.finestLevel = finestLevel;
+    settings.threads = 2;
+    return std::make_unique<SceneRenderer>(makeMeshDrawer(), scene.frame, std::move(scene.tree),
+                                           std::move(scene.source), settings);
+  }
+  // PSNR between two renderers over the test photos.
+  static double compare(ViewRenderer& a, ViewRenderer& b) {
+    double squares = 0, numbers = 0;
+    for (const int index : cube_->capture().photosIn(Split::test)) {
+      const Photo& photo = cube_->capture().photos[index];
+      const Camera& camera = cube_->capture().cameras[photo.camera];
+      const ImageF one = compositeOver(a.render(camera, photo.worldFromCamera), {0, 0, 0}),
+                   other = compositeOver(b.render(camera, photo.worldFromCamera), {0, 0, 0});
+      for (size_t i = 0; i < one.pixels.size(); ++i, ++numbers) squares += std::pow(one.pixels[i] - other.pixels[i], 2);
+    }
+    return -10 * std::log10(squares / numbers);
+  }
+
+  static std::unique_ptr<CubeScene> cube_;
+  static std::unique_ptr<Device> device_;
+};
+std::unique_ptr<CubeScene> BakeMeshScene::cube_;
+std::unique_ptr<Device> BakeMeshScene::device_;
+
+TEST_F(BakeMeshScene, LooksAsTheModelAtItsFinestLevel) {
+  const BakedScene baked = bake("scene", {.patchEdge = 12, .tilesPerBlock = 2});
+  EXPECT_EQ(baked.tileset.columns, 4u);
+  EXPECT_EQ(baked.tileset.rows, 2u);
+  ASSERT_EQ(baked.levels.size(), 2u);
+  TrainedMesh mesh = loadTrainedMesh(*device_, model());
+  MeshRenderer renderer(mesh);
+  const auto fine = open("scene"), coarse = open("scene", 1);
+  const double psnr = compare(*fine, renderer);
+  EXPECT_GT(psnr, 22) << "a wrong place of any part gives less than 15";
+  EXPECT_LT(compare(*coarse, renderer), psnr) << "the coarsest level has less detail";
+  EXPECT_EQ(baked.levels[0].counts[0].first, "triangles");
+  EXPECT_LT(baked.levels[1].counts[0].second, baked.levels[0].counts[0].second);
+}
+
+TEST_F(BakeMeshScene, GivesTheSameBytesAgainAndTheSameImageFromOtherTiles) {
+  bake("one", {.tilesPerBlock = 1});
+  bake("again", {.tilesPerBlock = 1});
+  bake("pieces", {.tilesPerBlock = 4});
+  EXPECT_EQ(readTextFile(*cube_ / "one" / "tileset.json"), readTextFile(*cube_ / "again" / "tileset.json"))
+      << "names contain digests of the files";
+  const auto one = open("one"), pieces = open("pieces");
+  EXPECT_GT(compare(*one, *pieces), 50) << "the same patches in other tiles";
+}
+
+TEST_F(BakeMeshScene, ContainsOrdinaryMeshesWithTexturesThatExist) {
+  const BakedScene baked = bake("ordinary", {});
+  std::set<std::string> textures;
+  size_t meshes = 0;
+  for (const Tile& tile : baked.tileset.tiles) {
+    for (const TileContent& content : tile.contents) {
+      const Bytes file = readFile(contentPath(*cube_ / "ordinary", content.uri));
+      const auto glb = decodeGlb(file);
+      ASSERT_TRUE(glb);
+      const nlohmann::json asset = nlohmann::json::parse(glb->json);
+      if (!asset.contains("meshes")) continue;
+      meshes += asset["meshes"].size();
+      for (const auto& image : asset["images"]) {
+        const fs::path path =
+            *cube_ / "ordinary" / fs::path(content.uri).parent_path() / image["uri"].get<std::string>();
+        const auto info = probeImage(readFile(path));
+        ASSERT_TRUE(info) << path;
+        textures.insert(fs::canonical(path).string());
+      }
+      for (const auto& accessor : asset["accessors"]) EXPECT_GT(accessor["count"].get<int>(), 0);
+      EXPECT_TRUE(content.resources.empty()) << "viewers need not fetch textures";
+    }
+  }
+  EXPECT_GE(meshes, 3u);
+  EXPECT_EQ(textures.size(), baked.tileset.resources.size());
+  bake("without", {.fallback = false});
+  EXPECT_FALSE(fs::exists(*cube_ / "without" / "resources"));
+}
+
+}  // namespace
+}  // namespace tessera

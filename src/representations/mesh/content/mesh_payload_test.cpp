@@ -1,0 +1,470 @@
+#include "representations/mesh/content/mesh_payload.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/random.h"
+#include "representations/mesh/testing/random_mesh.h"
+#include "tiles/content_file.h"
+#include "tiles/read_content.h"
+#include "tiles/testing/content_refusal.h"
+
+namespace tessera {
+namespace {
+
+using nlohmann::json;
+using tiles_test::randomMeshContent;
+using tiles_test::randomMeshNetwork;
+
+void expectSameMesh(const MeshContent& a, const MeshContent& b) {
+  EXPECT_EQ(a.isBackground, b.isBackground);
+  EXPECT_EQ(a.skyEdge, b.skyEdge);
+  EXPECT_EQ(a.sky, b.sky);
+  ASSERT_EQ(a.parts.size(), b.parts.size());
+  for (size_t i = 0; i < a.parts.size(); ++i) {
+    const PatchSet &one = a.parts[i], &other = b.parts[i];
+    EXPECT_EQ(one.patchEdge, other.patchEdge);
+    EXPECT_EQ(one.patches, other.patches);
+    EXPECT_EQ(one.pairs, other.pairs);
+    EXPECT_EQ(one.origin, other.origin);
+    EXPECT_EQ(one.step, other.step);
+    EXPECT_EQ(one.vertices, other.vertices);
+    EXPECT_EQ(one.ranges, other.ranges);
+    EXPECT_EQ(one.featureBlocks, other.featureBlocks);
+    EXPECT_EQ(one.opacityBlocks, other.opacityBlocks);
+    EXPECT_TRUE(one.decoder == other.decoder);
+  }
+}
+
+void expectRoundTrip(const MeshContent& content) {
+  std::string reason;
+  const auto again = decodeMesh(encodeMesh(content), reason);
+  ASSERT_TRUE(again) << reason;
+  EXPECT_EQ(reason, "");
+  expectSameMesh(content, *again);
+}
+
+PatchSet emptyPatchSet() {
+  PatchSet set;
+  set.decoder = randomMeshNetwork(1);
+  return set;
+}
+
+json parsePayloadAsset(const Bytes& file) {
+  return json::parse(decodeGlb(file)->json)["extensions"]["TESSERA_content"];
+}
+
+TEST(MeshPayload, GivesBackWhatWasWritten) {
+  for (uint64_t seed = 0; seed < 6; ++seed) {
+    const MeshContent content = randomMeshContent(seed, static_cast<uint32_t>(1 + seed % 3));
+    EXPECT_FALSE(parsePayloadAsset(encodeMesh(content)).contains("sky"));
+    expectRoundTrip(content);
+  }
+}
+
+TEST(MeshPayload, GivesBackABackgroundBlockWithItsSky) {
+  MeshContent content = randomMeshContent(3, 1, true);
+  ASSERT_EQ(content.skyEdge, 4u);
+  expectRoundTrip(content);
+  content.skyEdge = 0;
+  content.sky.clear();
+  expectRoundTrip(content);
+}
+
+TEST(MeshPayload, GivesBackAPartWithoutPatches) {
+  MeshContent content = randomMeshContent(4, 1);
+  content.parts.insert(content.parts.begin(), emptyPatchSet());
+  expectRoundTrip(content);
+  const json part = parsePayloadAsset(encodeMesh(content))["parts"][0];
+  for (const char* key : {"vertices", "features", "opacity"}) EXPECT_FALSE(part.contains(key)) << key;
+}
+
+TEST(MeshPayload, GivesBackOddNumbersExactly) {
+  MeshContent content = randomMeshContent(5, 1);
+  PatchSet& part = content.parts[0];
+  part.origin = {-1e7, -0.1, std::numeric_limits<double>::denorm_min()};
+  part.step = 1.0 / 3;
+  part.ranges[0] = {-1e6f, 1e6f};
+  part.ranges[1] = {-0.1f, -0.1f};
+  part.ranges[2] = {-std::numeric_limits<float>::denorm_min(), std::numeric_limits<float>::denorm_min()};
+  expectRoundTrip(content);
+}
+
+TEST(MeshPayload, HasACodecThatLetsContentsOverlap) {
+  EXPECT_EQ(meshCodec().representation(), kMeshName);
+  EXPECT_TRUE(meshCodec().contentsMayOverlap());
+}
+
+TEST(MeshPayload, ReportsItsMemoryFromHeadersAlone) {
+  const fs::path path = fs::temp_directory_path() / ("tessera-mesh-file-" + std::to_string(::getpid()) + ".glb");
+  MeshContent empty = randomMeshContent(7, 1);
+  empty.parts.push_back(emptyPatchSet());
+  for (const MeshContent& content : {randomMeshContent(5, 2), randomMeshContent(6, 1, true), empty}) {
+    writeFileAtomically(path, encodeMesh(content));
+    EXPECT_EQ(readDecodedBytes(path, meshCodec()), bytesInMemory(content));
+    const auto again = readContent(path, meshCodec());
+    EXPECT_EQ(again->memoryBytes(), bytesInMemory(content));
+    expectSameMesh(contentAs<MeshContent>(*again), content);
+  }
+  fs::remove(path);
+}
+
+TEST(MeshPayload, CountsTheBytesThatItsPartsHold) {
+  const MeshContent content = randomMeshContent(3, 2, true);
+  uint64_t sum = sizeof(MeshContent) + content.sky.size();
+  for (const PatchSet& part : content.parts) {
+    uint64_t bytes = sizeof(PatchSet) + 2 * part.vertices.size() + part.opacityBlocks.size();
+    for (const auto& blocks : part.featureBlocks) bytes += blocks.size();
+    EXPECT_EQ(patchSetBytes(part), bytes);
+    sum += bytes + bytesInMemory(part.decoder);
+  }
+  EXPECT_EQ(bytesInMemory(content), sum);
+  EXPECT_EQ(patchSetBytes(emptyPatchSet()), sizeof(PatchSet));
+}
+
+TEST(MeshPayload, HasTexturesThatEveryGpuSupportsUpToItsBounds) {
+  for (uint32_t edge = PatchSet::kMinPatchEdge; edge <= PatchSet::kMaxPatchEdge; edge += 4) {
+    PatchSet set;
+    set.patchEdge = edge;
+    for (const uint32_t patches : {1u, 2u, 3u, 4u, 5u, 12u, 13u, 16u, maxPatches(edge)}) {
+      set.patches = patches;
+      EXPECT_LE(set.textureWidth(), PatchSet::kMaxTextureEdge);
+      EXPECT_LE(set.textureHeight(), PatchSet::kMaxTextureEdge);
+      const uint32_t across = set.patchesAcross();
+      EXPECT_GE(across * across, patches);
+      EXPECT_LT((across - 1) * (across - 1), patches);
+      EXPECT_GE(across * (set.textureHeight() / edge), patches);
+      EXPECT_LT(across * (set.textureHeight() / edge - 1), patches);
+    }
+  }
+}
+
+TEST(MeshPayload, RefusesToWriteMoreThanReadersTake) {
+  MeshContent content;
+  content.parts.assign(ContentLimits().parts + 1, emptyPatchSet());
+  EXPECT_THROW(encodeMesh(content), Error);
+  content.parts.pop_back();
+  expectRoundTrip(content);
+}
+
+TEST(MeshPayload, NamesTheRuleThatIsBroken) {
+  const auto names = [](const char* rule, const std::function<void(MeshContent&)>& spoil) {
+    MeshContent content = randomMeshContent(2, 2, true);
+    ASSERT_EQ(validationError(content), std::nullopt);
+    spoil(content);
+    EXPECT_EQ(validationError(content).value_or("none"), rule);
+  };
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  names("the edge of its sky is out of bounds", [](MeshContent& c) { c.skyEdge = 1; });
+  names("the edge of its sky is out of bounds", [](MeshContent& c) { c.skyEdge = kMaxSkyEdge + 1; });
+  names("it has a sky, but is no background block", [](MeshContent& c) { c.isBackground = false; });
+  names("its sky has the wrong size", [](MeshContent& c) { c.sky.pop_back(); });
+  names("its sky has the wrong size", [](MeshContent& c) { c.skyEdge = 0; });
+  names("there are no parts", [](MeshContent& c) { c.parts.clear(); });
+  for (const uint32_t edge : {0u, 4u, 10u, 36u})
+    names("part 1: its patch_edge is out of bounds", [&](MeshContent& c) { c.parts[1].patchEdge = edge; });
+  const char* count = "part 0: its patches or pairs are out of bounds";
+  names(count, [](MeshContent& c) { c.parts[0].pairs = c.parts[0].patches + 1; });
+  names(count, [](MeshContent& c) { c.parts[0].patches = maxPatches(c.parts[0].patchEdge) + 1; });
+  for (const double step : {0.0, -1.0, 1e-13, 1e6, double{nan}, double{INFINITY}})
+    names("part 0: its step is out of bounds", [&](MeshContent& c) { c.parts[0].step = step; });
+  for (const double place : {1.1e7, -1.1e7, double{nan}, double{INFINITY}})
+    names("part 1: its origin is out of bounds", [&](MeshContent& c) { c.parts[1].origin[2] = place; });
+  const char* range = "part 0: a range is out of bounds";
+  names(range, [&](MeshContent& c) { c.parts[0].ranges[7].high = nan; });
+  names(range, [&](MeshContent& c) { c.parts[0].ranges[7].low = nan; });
+  names(range, [](MeshContent& c) { c.parts[0].ranges[0] = {1, 0}; });
+  names(range, [](MeshContent& c) { c.parts[0].ranges[0] = {0, 2e6f}; });
+  names(range, [](MeshContent& c) { c.parts[0].ranges[0] = {-2e6f, 0}; });
+  names("part 0: it has the wrong number of vertices", [](MeshContent& c) { c.parts[0].vertices.pop_back(); });
+  names("part 1: its features have the wrong size", [](MeshContent& c) { c.parts[1].featureBlocks[3].pop_back(); });
+  names("part 1: its opacity has the wrong size", [](MeshContent& c) { c.parts[1].opacityBlocks.push_back(0); });
+  names("part 0: the network has no layers, or too many", [](MeshContent& c) { c.parts[0].decoder.clear(); });
+  names("part 0: the network's layers do not follow one another",
+        [](MeshContent& c) { c.parts[0].decoder[0].inputs = 23; });
+  names("part 1: the network does not end in a colour", [](MeshContent& c) { c.parts[1].decoder.pop_back(); });
+  names("part 1: the network contains a number that is not finite",
+        [&](MeshContent& c) { c.parts[1].decoder[1].biases[2] = nan; });
+}
+
+TEST(MeshPayload, IsNotWhatTheTilesetDeclaresIfItIsElsewhereOrOfAnotherKind) {
+  MeshContent content = randomMeshContent(8, 2);
+  TileContent declared;
+  declared.box = {Vec3d::Constant(INFINITY), Vec3d::Constant(-INFINITY)};
+  for (PatchSet& part : content.parts) {
+    ASSERT_LT(part.pairs, part.patches);
+    // The last patch is single, and its corner 3 lies far beyond the others.
+    for (uint16_t& number : part.vertices) number /= 2;
+    for (size_t axis = 0; axis < 3; ++axis) part.vertices[part.vertices.size() - 3 + axis] = UINT16_MAX;
+    for (uint32_t patch = 0; patch < part.patches; ++patch)
+      for (uint32_t corner = 0; corner < (patch < part.pairs ? 4u : 3u); ++corner) {
+        declared.box.low = declared.box.low.cwiseMin(part.corner(patch, corner));
+        declared.box.high = declared.box.high.cwiseMax(part.corner(patch, corner));
+      }
+  }
+  const auto mismatch = [&] { return mismatchWithTileset(content, declared).value_or("none"); };
+  const SceneBox exact = declared.box;
+  EXPECT_EQ(mismatch(), "none");
+  // The box may be smaller by the tolerance.
+  declared.box = {exact.low + Vec3d::Constant(5e-7), exact.high - Vec3d::Constant(5e-7)};
+  EXPECT_EQ(mismatch(), "none");
+  for (int axis = 0; axis < 3; ++axis) {
+    declared.box = exact;
+    declared.box.low[axis] += 1e-5;
+    EXPECT_NE(mismatch(), "none");
+    declared.box = exact;
+    declared.box.high[axis] -= 1e-5;
+    EXPECT_NE(mismatch(), "none");
+  }
+  declared.box = exact;
+  for (size_t i = 0; i < 3; ++i) content.parts[1].vertices[i] = UINT16_MAX;
+  EXPECT_EQ(mismatch(), "part 1 reaches out of the content's box");
+  declared.backgroundBlock = true;
+  EXPECT_EQ(mismatch(), "it is not a background block");
+  content.isBackground = true;
+  declared.backgroundBlock = false;
+  EXPECT_EQ(mismatch(), "it is a background block");
+}
+
+TEST(MeshPayload, MixesFourTexelsOfWholeBlocks) {
+  for (uint64_t seed = 0; seed < 4; ++seed) {
+    const MeshContent content = randomMeshContent(10 + seed, 1);
+    const PatchSet& set = content.parts[0];
+    const RandomStream random(seed, 5);
+    const uint32_t edge = set.patchEdge, blocksAcross = set.textureWidth() / 4;
+    // Texel (x, y) of a texture whose blocks have `stride` bytes, of which those from `offset` on are decoded.
+    const auto texelAt = [&](const std::vector<uint8_t>& blocks, uint32_t stride, uint32_t offset, uint32_t x,
+                             uint32_t y) {
+      Bc4Block block;
+      std::copy_n(blocks.begin() + stride * (x / 4 + blocksAcross * (y / 4)) + offset, block.size(), block.begin());
+      return double{decodeBc4(block)[x % 4 + 4 * (y % 4)]} / 255;
+    };
+    for (uint32_t i = 0; i < 400; ++i) {
+      const uint32_t patch = i % set.patches, last = edge - 1;
+      // Texels of the corners and of the sides, and places between texels.
+      const auto placeAt = [&](uint64_t k) {
+        const uint32_t kind = random.below(8 * i + k, 4);
+        return kind == 0 ? 0.0f : kind == 1 ? static_cast<float>(last) : random.uniform(8 * i + k + 2) * last;
+      };
+      const float column = placeAt(0), row = placeAt(1);
+      const uint32_t x = static_cast<uint32_t>(column), y = static_cast<uint32_t>(row);
+      const auto mix = [&](const std::vector<uint8_t>& blocks, uint32_t stride, uint32_t offset) {
+        double sum = 0;
+        for (uint32_t dy = 0; dy < 2; ++dy)
+          for (uint32_t dx = 0; dx < 2; ++dx) {
+            if (x + dx > last || y + dy > last) continue;  // has no weight
+            const double u = double{column} - x, v = double{row} - y;
+            sum += (dx == 1 ? u : 1 - u) * (dy == 1 ? v : 1 - v) *
+                   texelAt(blocks, stride, offset, edge * (patch % set.patchesAcross()) + x + dx,
+                           edge * (patch / set.patchesAcross()) + y + dy);
+          }
+        return sum;
+      };
+      const MeshTexel mixed = mixTexels(set, patch, column, row);
+      for (uint32_t f = 0; f < kMeshFeatures; ++f) {
+        const double low = set.ranges[f].low, high = set.ranges[f].high;
+        EXPECT_NEAR(mixed.features[f], low + (high - low) * mix(set.featureBlocks[f / 2], 16, 8 * (f % 2)), 1e-5);
+      }
+      EXPECT_NEAR(mixed.opacity, mix(set.opacityBlocks, 8, 0), 1e-6);
+    }
+  }
+}
+
+TEST(MeshPayload, HasASkyWhoseSidesAreAsTheFormatSays) {
+  MeshContent content = randomMeshContent(9, 1, true);
+  content.skyEdge = 3;  // so that the axes are at the centres of texels
+  content.sky.resize(size_t{18} * 3 * 3);
+  for (size_t i = 0; i < content.sky.size(); ++i) content.sky[i] = static_cast<uint8_t>(7 * i);
+  const auto texelAt = [&](uint32_t side, uint32_t column, uint32_t row, uint32_t channel) {
+    return content.sky[3 * ((3 * side + row) * 3 + column) + channel] / 255.0f;
+  };
+  const auto expectTexel = [&](const Vec3d& direction, uint32_t side, uint32_t column, uint32_t row) {
+    for (const double length : {1.0, 2.5}) {
+      const std::array<float, 3> colour = skyColour(content, length * direction);
+      for (uint32_t c = 0; c < 3; ++c) EXPECT_NEAR(colour[c], texelAt(side, column, row, c), 1e-6) << side;
+    }
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    const Vec3d x = Vec3d::Unit(axis), columns = Vec3d::Unit((axis + 1) % 3), rows = Vec3d::Unit((axis + 2) % 3);
+    const uint32_t side = static_cast<uint32_t>(2 * axis);
+    expectTexel(x, side, 1, 1);
+    expectTexel(-x, side + 1, 1, 1);
+    expectTexel(x + 0.9999999 * columns, side, 2, 1);
+    expectTexel(-x - 0.9999999 * columns, side + 1, 0, 1);
+    expectTexel(x + 0.9999999 * rows, side, 1, 2);
+    expectTexel(-x - 0.9999999 * rows, side + 1, 1, 0);
+  }
+  // The first of equal axes counts.
+  expectTexel({1, 1, 1}, 0, 2, 2);
+  expectTexel({-1, 1, -1}, 1, 2, 0);
+  expectTexel({0, -1, 1}, 3, 2, 1);
+  // Column 1 + 1/4 and row 1 + 1/2 of side 5 (-z), whose columns run along x and whose rows run along y.
+  const std::array<float, 3> colour = skyColour(content, {0.25, 0.5, -1});
+  for (uint32_t c = 0; c < 3; ++c) {
+    const float upper = 0.75f * texelAt(5, 1, 1, c) + 0.25f * texelAt(5, 2, 1, c),
+                lower = 0.75f * texelAt(5, 1, 2, c) + 0.25f * texelAt(5, 2, 2, c);
+    EXPECT_NEAR(colour[c], (upper + lower) / 2, 1e-6);
+  }
+}
+
+class MeshDecoder : public tiles_test::Refusal {
+ protected:
+  Bytes file() const override { return encodeMesh(randomMeshContent(5, 2, true)); }
+  bool isRead(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits) const override {
+    return decodeMesh(file, reason, limits).has_value();
+  }
+};
+
+TEST_F(MeshDecoder, RejectsMalformedHeaders) {
+  refuses("is not of the representation mesh", [](json& asset) { ours(asset)["representation"] = "another"; });
+  refuses("has version 2", [](json& asset) { ours(asset)["version"] = 2; });
+  refuses("background_block is missing", [](json& asset) { ours(asset).erase("background_block"); });
+  refuses("background_block is missing", [](json& asset) { ours(asset)["background_block"] = 1; });
+  const std::string list = "its parts are not a list, or";
+  refuses(list, [](json& asset) { ours(asset).erase("parts"); });
+  refuses(list, [](json& asset) { ours(asset)["parts"] = json::array(); });
+  refuses(list, [](json& asset) { ours(asset)["parts"] = part(asset); });
+  ContentLimits limits;
+  limits.parts = 1;
+  refuses(
+      list, [](json&) {}, limits);
+}
+
+TEST_F(MeshDecoder, RejectsMalformedSkies) {
+  const std::string edge = "the edge of its sky is out of bounds";
+  for (const json& lie : {json(0), json(1), json(1025), json(-4), json(4.5), json("4")})
+    refuses(edge, [&](json& asset) { ours(asset)["sky"]["edge"] = lie; });
+  refuses(edge, [](json& asset) { ours(asset)["sky"].erase("edge"); });
+  refuses(edge, [](json& asset) { ours(asset)["sky"] = 4; });
+  const std::string sky = "its sky is malformed";
+  refuses(sky, [](json& asset) { ours(asset)["sky"]["edge"] = 5; });
+  refuses(sky, [](json& asset) { ours(asset)["sky"].erase("texels"); });
+  refuses(sky, [](json& asset) { ours(asset)["sky"]["texels"]["mimeType"] = "image/png"; });
+  refuses(sky, [](json& asset) { ours(asset)["sky"]["texels"]["bufferView"] = 999; });
+  refusesBytes(
+      sky, [](json& asset, Bytes& bytes) { replace(asset, bytes, ours(asset)["sky"]["texels"], ImageU8(24, 4, 3)); });
+  refuses("it has a sky, but is no background block", [](json& asset) { ours(asset)["background_block"] = false; });
+}
+
+TEST_F(MeshDecoder, RejectsMalformedParts) {
+  const std::string edge = "part 0: its patch_edge is out of bounds";
+  for (const json& lie : {json(0), json(4), json(10), json(36), json(8.5), json("8")})
+    refuses(edge, [&](json& asset) { part(asset)["patch_edge"] = lie; });
+  refuses(edge, [](json& asset) { part(asset).erase("patch_edge"); });
+  refuses(edge, [](json& asset) { part(asset) = 3; });
+  const std::string count = "part 0: its patches or pairs are out of bounds";
+  for (const json& lie : {json(-1), json(1.5), json(1 << 20), json("3")}) {
+    refuses(count, [&](json& asset) { part(asset)["patches"] = lie; });
+    refuses(count, [&](json& asset) { part(asset)["pairs"] = lie; });
+  }
+  refuses(count, [](json& asset) { part(asset).erase("patches"); });
+  refuses(count, [](json& asset) { part(asset).erase("pairs"); });
+  const std::string place = "part 0: its origin or step is missing or malformed";
+  refuses(place, [](json& asset) { part(asset).erase("origin"); });
+  refuses(place, [](json& asset) { part(asset)["origin"].erase(2); });
+  refuses(place, [](json& asset) { part(asset)["origin"][1] = "0"; });
+  refuses(place, [](json& asset) { part(asset).erase("step"); });
+  refuses(place, [](json& asset) { part(asset)["step"] = nullptr; });
+  refuses("part 0: its origin is out of bounds", [](json& asset) { part(asset)["origin"][1] = 1e9; });
+  refuses("part 0: its step is out of bounds", [](json& asset) { part(asset)["step"] = 0; });
+  const std::string ranges = "part 0: its ranges are missing or malformed";
+  refuses(ranges, [](json& asset) { part(asset).erase("ranges"); });
+  refuses(ranges, [](json& asset) { part(asset)["ranges"].erase(7); });
+  refuses(ranges, [](json& asset) { part(asset)["ranges"].push_back({0, 1}); });
+  refuses(ranges, [](json& asset) { part(asset)["ranges"][3] = {1}; });
+  refuses(ranges, [](json& asset) { part(asset)["ranges"][3][0] = "a"; });
+  refuses("part 0: a range is out of bounds", [](json& asset) { part(asset)["ranges"][3] = {1, 0}; });
+  refuses("part 0: a range is out of bounds", [](json& asset) { part(asset)["ranges"][3] = {0, 1e7}; });
+}
+
+TEST_F(MeshDecoder, RejectsMalformedBytesOfParts) {
+  const std::string vertices = "part 0: its vertices are malformed", features = "part 0: its features are malformed",
+                    opacity = "part 0: its opacity is malformed";
+  const auto spoilReference = [&](const std::string& why, const std::function<json&(json&)>& entry) {
+    refuses(why, [&](json& asset) { entry(asset) = 3; });
+    refuses(why, [&](json& asset) { entry(asset)["bufferView"] = 999; });
+    refuses(why, [&](json& asset) { entry(asset)["mimeType"] = "image/webp"; });
+    refuses(why, [&](json& asset) {
+      json& view = asset["bufferViews"][entry(asset)["bufferView"].get<size_t>()];
+      view["byteLength"] = view["byteLength"].get<uint32_t>() - 1;
+    });
+  };
+  spoilReference(vertices, [](json& asset) -> json& { return part(asset)["vertices"]; });
+  for (const size_t k : {0u, 3u})
+    spoilReference(features, [k](json& asset) -> json& { return part(asset)["features"][k]; });
+  spoilReference(opacity, [](json& asset) -> json& { return part(asset)["opacity"]; });
+  refuses(vertices, [](json& asset) { part(asset).erase("vertices"); });
+  refuses(vertices, [](json& asset) { part(asset)["patches"] = part(asset)["patches"].get<uint32_t>() + 1; });
+  refuses(features, [](json& asset) { part(asset).erase("features"); });
+  refuses(features, [](json& asset) { part(asset)["features"].erase(3); });
+  refuses(features, [](json& asset) { part(asset)["features"].push_back(part(asset)["features"][0]); });
+  refuses(features, [](json& asset) { part(asset)["patch_edge"] = part(asset)["patch_edge"] == 8 ? 12 : 8; });
+  refuses(opacity, [](json& asset) { part(asset).erase("opacity"); });
+  refuses("part 1: its opacity is malformed", [](json& asset) { ours(asset)["parts"][1].erase("opacity"); });
+}
+
+TEST_F(MeshDecoder, RejectsMalformedNetworks) {
+  refuses("has no network", [](json& asset) { part(asset).erase("network"); });
+  refuses("has no network", [](json& asset) { part(asset)["network"].erase("layers"); });
+  refuses("has no network", [](json& asset) { part(asset)["network"].erase("bufferView"); });
+  refuses("a layer of the network has no two sides", [](json& asset) { part(asset)["network"]["layers"][0] = {17}; });
+  refuses("a layer of the network is out of bounds", [](json& asset) {
+    part(asset)["network"]["layers"][0] = {17, 1000};
+  });
+  refuses("the network has fewer numbers", [](json& asset) { part(asset)["network"]["layers"][0] = {17, 20}; });
+  refuses("the network has more numbers", [](json& asset) { part(asset)["network"]["layers"].erase(1); });
+  // As many numbers as before, but layers that do not follow one another.
+  refuses("part 0: the network's layers do not follow one another", [](json& asset) {
+    part(asset)["network"]["layers"] = {{16, 3}, {17, 16}};
+  });
+}
+
+TEST_F(MeshDecoder, RejectsContentsAboveTheMemoryLimitBeforeAllocating) {
+  ContentLimits limits;
+  limits.bytes = bytesInMemory(randomMeshContent(5, 2, true));
+  std::string reason;
+  EXPECT_TRUE(decodeMesh(file(), reason, limits)) << reason;
+  --limits.bytes;
+  const std::string why = "takes more than " + std::to_string(limits.bytes) + " bytes of memory";
+  refuses(
+      why, [](json&) {}, limits);
+  EXPECT_FALSE(decodedMeshBytes(decodeGlb(file())->json, reason, limits));
+  EXPECT_EQ(reason, why);
+  refuses("takes more than 1073741824 bytes of memory", [](json& asset) {
+    part(asset)["patch_edge"] = 32;
+    part(asset)["patches"] = maxPatches(32);
+    const json large = part(asset);
+    for (int i = 0; i < 15; ++i) ours(asset)["parts"].push_back(large);
+  });
+}
+
+TEST_F(MeshDecoder, RejectsAFileThatIsCutAnywhere) {
+  const Bytes whole = file();
+  std::string reason;
+  for (size_t length = 0; length < whole.size(); ++length) {
+    ASSERT_FALSE(decodeMesh(std::span(whole).first(length), reason)) << length;
+    ASSERT_NE(reason, "");
+  }
+}
+
+TEST_F(MeshDecoder, SurvivesCorruptedBytes) {
+  const Bytes whole = file();
+  const RandomStream random(4, 4);
+  std::string reason;
+  for (uint64_t trial = 0; trial < 400; ++trial) {
+    Bytes spoilt = whole;
+    spoilt[random.below(2 * trial, static_cast<uint32_t>(whole.size()))] ^=
+        std::byte(1 + random.below(2 * trial + 1, 255));
+    const bool isAccepted = decodeMesh(spoilt, reason).has_value();
+    EXPECT_EQ(isAccepted, reason.empty());
+  }
+}
+
+}  // namespace
+}  // namespace tessera

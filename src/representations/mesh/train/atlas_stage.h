@@ -1,0 +1,45 @@
+// The final stage of training, which the paper lacks: with frozen triangles, the networks are trained through the atlas
+// as a renderer will draw it. Texels come from the encoder, are stored in 8 bits (with a gradient that ignores the
+// rounding) and mixed bilinearly; every hit is decoded, and all hits are composited. So what is lost between the model
+// and its contents becomes part of the loss.
+#pragma once
+
+#include "representations/mesh/train/texel_atlas.h"
+#include "train/photo_loss.h"
+
+namespace tessera {
+
+class AtlasStage {
+ public:
+  // Opacities of at least `kOpaqueFrom` are stored as 1, those below `kTransparentBelow` as 0.
+  static constexpr float kOpaqueFrom = 0.8f, kTransparentBelow = 0.02f;
+  static constexpr uint32_t kLosses = PhotoLoss::kLosses + 1;     // of the photos, and of dithering
+  static constexpr uint32_t kCounters = MeshHits::kCounters + 1;  // of hits, of rays, of texels
+
+  // `model` has an atlas; a reference to it is kept. hitCapacity: of a step.
+  AtlasStage(MeshModel& model, uint32_t maxRays, uint32_t hitCapacity);
+
+  // Adds the gradients of a step's rays to those of the networks, the table and the sky. `losses`: [kLosses];
+  // `counters`: [kCounters].
+  void addGradients(const PhotoRays& rays, PhotoLoss& photoLoss, Slice<float> losses, Slice<uint32_t> counters);
+  // The composited colours and opacities of the last rays, [rays][3] and [rays].
+  Slice<const float> colours() const { return colour_.all(); }
+  Slice<const float> opacities() const { return opacity_.all(); }
+
+ private:
+  struct Step;
+  void lookUp(const Step& step);
+  void composite(const Step& step, PhotoLoss& photoLoss);
+
+  MeshModel& model_;
+  Device& device_;
+  TexelAtlas atlas_;
+  uint32_t texelCapacity_;
+  MeshHits hits_;
+  Array<uint32_t> texels_, rows_, marks_, ranks_, rowIds_;
+  Array<float> ranges_, weights_, texelPositions_, stored_, storedGradients_, featureGradients_;
+  Array<float> opacities_, opacityGradients_, sampleWeights_, weightGradients_, colourGradients_, ditherGradients_;
+  Array<float> colour_, opacity_, skyColour_, ditherColourGradients_;
+};
+
+}  // namespace tessera

@@ -1,0 +1,31 @@
+#include "representations/mesh/train/face_set.h"
+
+#include <bit>
+
+namespace tessera {
+
+void FaceSet::add(uint32_t face, const Vec3f& direction) {
+  add(face);
+  directions_.try_emplace(face, Vec3f::Zero()).first->second += direction;
+}
+
+size_t FaceSet::count() const {
+  size_t faces = 0;
+  for (const uint32_t word : bits_) faces += static_cast<size_t>(std::popcount(word));
+  return faces;
+}
+
+Vec3f FaceSet::direction(uint32_t face) const {
+  const auto entry = directions_.find(face);
+  return entry == directions_.end() ? Vec3f(Vec3f::Zero()) : entry->second;
+}
+
+std::vector<uint32_t> FaceSet::numbers() const {
+  std::vector<uint32_t> numbers;
+  for (uint32_t word = 0; word < bits_.size(); ++word)
+    for (uint32_t bits = bits_[word]; bits != 0; bits &= bits - 1)
+      numbers.push_back(32 * word + static_cast<uint32_t>(std::countr_zero(bits)));
+  return numbers;
+}
+
+}  // namespace tessera
