@@ -6,9 +6,11 @@
 #   city         a city of 2x2 blocks, 15 minutes with coarse field and final stage: held-out PSNR of the baked scene and of its
 #                levels, beside `field` in the same time; bytes, triangles and time of baking; its contents as glTF files
 #   final        the same city in the same time without the final stage, and what each step from its model to contents loses
+#   holes        200 fresh views of that city from other heights: the share of pixels in which the scene's blocks have a hole, at the
+#                finest level and with levels mixed
 #   fox, beach   real photographs, 10 minutes each: held-out PSNR of the baked scene
 # Resumable: everything is kept in build/bench/mesh, and what exists is not made again; remove traversal-* there to repeat a row.
-#   [ROWS="traversal city final fox beach"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
+#   [ROWS="traversal city final holes fox beach"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
 # CAPTURE: the capture of MODEL, if it is not where its blocks.json says.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -111,6 +113,22 @@ final() {
   chained city-plain city
 }
 
+holes() {
+  need_tessera
+  local program=build/release/bench/mesh_holes error
+  [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_holes"
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  [ -e "$work/fresh/transforms.json" ] ||
+    "$tessera" synth city "$work/fresh" --blocks 2x2 --photos 200 --altitudes 40,90 --size 200x150 --samples 1
+  for error in 1.5 12; do
+    "$program" "$work/city-mesh.scene" "$work/fresh" "$error" > "$work/holes-$error.json"
+    verdict "city 2x2, levels $(jq -c .levels "$work/holes-$error.json"): share of pixels with a hole" \
+      "$(jq .share "$work/holes-$error.json")" '<=' 0.001
+  done
+}
+
 # photos NAME DOWNSCALE BOUND ARGUMENTS...: the same for real photographs.
 photos() {
   need_tessera
@@ -126,5 +144,5 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city final fox beach}; do "$row"; done
+for row in ${ROWS:-traversal city final holes fox beach}; do "$row"; done
 finish

@@ -95,11 +95,17 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       const uint32_t left = tile ? tile->left : 0, top = tile ? tile->top : 0;
       const uint32_t right = tile ? tile->right : static_cast<uint32_t>(image.width);
       const uint32_t bottom = tile ? tile->bottom : static_cast<uint32_t>(image.height);
-      const uint32_t column = inSquare % options.square, row = inSquare / options.square;
-      uint32_t x = left + random.below(draw++, std::max(right - left, options.square) - options.square + 1) + column;
-      uint32_t y = top + random.below(draw++, std::max(bottom - top, options.square) - options.square + 1) + row;
-      x = std::min(x, right - 1);  // of tiles that are smaller than a square
-      y = std::min(y, bottom - 1);
+      uint32_t x = left + random.below(draw++, right - left);
+      uint32_t y = top + random.below(draw++, bottom - top);
+      if (options.square > 1) {
+        const auto within = [&](uint32_t pixel, uint32_t place, int size) {
+          const int first = static_cast<int>(pixel) - static_cast<int>(random.below(draw++, options.square));
+          const int last = std::max(0, size - static_cast<int>(options.square));  // of the squares in the image
+          return std::min(static_cast<uint32_t>(std::clamp(first, 0, last)) + place, static_cast<uint32_t>(size) - 1);
+        };
+        x = within(x, inSquare % options.square, image.width);
+        y = within(y, inSquare / options.square, image.height);
+      }
       batch.distances[ray] = 0;
       const bool someKnown = wantsKnown && !nothing && !known.empty() && !known[entry.photo].empty();
       for (int pick = 0; someKnown && pick < kPicks; ++pick) {

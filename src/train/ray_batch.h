@@ -24,8 +24,9 @@ struct RayBatchOptions {
   bool randomBackground = true;
   double sparseDepthRayFraction = 0;               // share of the rays through sparse points, in photos that have some
   const std::vector<TileShares>* tiles = nullptr;  // [photo], draw from these tiles only; null: from whole photos
-  // Rays are drawn as squares of square² neighbouring pixels, one after another, within one tile. Squares are not drawn
-  // through sparse points, and their masked pixels are not redrawn.
+  // Rays are drawn as squares of square² neighbouring pixels, one after another. A pixel is drawn as for single rays,
+  // and the square is one of those around it. Squares are not drawn through sparse points, and their masked pixels are
+  // not redrawn.
   uint32_t square = 1;
 };
 

@@ -62,26 +62,26 @@ TEST(RayBatch, BeginsWithTheSameRaysWhateverTheirNumber) {
   EXPECT_TRUE(std::equal(few.targets.begin(), few.targets.end(), many.targets.begin()));
 }
 
-TEST(RayBatch, DrawsSquaresOfNeighbouringPixelsWithinTiles) {
+TEST(RayBatch, DrawsSquaresOfNeighbouringPixelsAroundThoseOfTiles) {
   std::vector<TileShares> tiles(10);
   tiles[4] = {{{4, 2, 1, 6, 5}}, {16}};
-  tiles[9] = {{{9, 1, 3, 2, 9}}, {6}};  // narrower than a square
-  constexpr uint32_t kSquares = 300;
+  constexpr uint32_t kSquares = 4000;
   RayBatch batch;
   drawRays(twoPhotos(), {}, {1, true, 0, &tiles, 3}, 7, 9 * kSquares, pool(), batch);
-  std::set<std::pair<float, float>> corners;
+  std::set<std::pair<float, float>> corners, pixels;
   for (size_t square = 0; square < kSquares; ++square) {
     const float left = batch.pixels[18 * square], top = batch.pixels[18 * square + 1];
-    const uint32_t photo = batch.photoOfRay[9 * square];
-    if (photo == 4) corners.insert({left, top});
+    corners.insert({left, top});
     for (size_t i = 0; i < 9; ++i) {
-      EXPECT_EQ(batch.photoOfRay[9 * square + i], photo);
+      EXPECT_EQ(batch.photoOfRay[9 * square + i], 4u);
       const float x = batch.pixels[2 * (9 * square + i)], y = batch.pixels[2 * (9 * square + i) + 1];
-      EXPECT_EQ(x, photo == 4 ? left + static_cast<float>(i % 3) : 1.5f);
+      EXPECT_EQ(x, left + static_cast<float>(i % 3));
       EXPECT_EQ(y, top + static_cast<float>(i / 3));
+      pixels.insert({x, y});
     }
   }
-  EXPECT_EQ(corners, (std::set<std::pair<float, float>>{{2.5f, 1.5f}, {3.5f, 1.5f}, {2.5f, 2.5f}, {3.5f, 2.5f}}));
+  EXPECT_EQ(corners.size(), 15u) << "all squares of the image that contain a pixel of the tile";
+  EXPECT_EQ(pixels.size(), 35u);
   EXPECT_NE(batch.backgrounds[0], batch.backgrounds[3]) << "of rays of one square";
 }
 

@@ -109,6 +109,13 @@ DenseNetwork::DenseNetwork(const std::vector<DenseLayer>& network, uint32_t inpu
   }
 }
 
+uint64_t DenseNetwork::memoryBytes() const {
+  uint64_t bytes = sizeof(DenseNetwork);
+  for (const Layer& layer : layers_)
+    bytes += sizeof(Layer) + sizeof(float) * (layer.weights.capacity() + layer.biases.capacity());
+  return bytes;
+}
+
 void DenseNetwork::run(float* values) const {
   HWY_DYNAMIC_DISPATCH(evaluateLayers)(layers_, values);
 }

@@ -28,6 +28,7 @@ class DenseNetwork {
     std::vector<float> biases;         // [outputs]
   };
   const std::vector<Layer>& layers() const { return layers_; }
+  uint64_t memoryBytes() const;
 
  private:
   std::vector<Layer> layers_;

@@ -165,7 +165,9 @@ BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces,
   for (uint32_t f = 0; hasRanges && f < kMeshFeatures; ++f)
     baked.ranges[f] = {model.atlas()->ranges[2 * f], model.atlas()->ranges[2 * f + 1]};
   if (!hasRanges)
-    field.forEachTexel(false, [&](size_t, const FieldTexel& texel) {
+    field.forEachTexel(false, [&](size_t number, const FieldTexel& texel) {
+      const uint32_t edge = settings.patchEdge, within = static_cast<uint32_t>(number % (size_t{edge} * edge));
+      if (!isTexelUsed(number / (size_t{edge} * edge) < baked.pairs, within % edge, within / edge, edge)) return;
       for (uint32_t f = 0; texel.opacity > 0 && f < kMeshFeatures; ++f) {
         baked.ranges[f].low = std::min(baked.ranges[f].low, texel.features[f]);
         baked.ranges[f].high = std::max(baked.ranges[f].high, texel.features[f]);

@@ -254,7 +254,7 @@ TEST_F(AtlasStageTest, SeesWhatIsDrawnOfTheBakedPatches) {
   train(config, 200, 200);
   ASSERT_TRUE(model().atlas());
   ASSERT_GT(model().atlas()->faces.count(), 100u);
-  AtlasStage stage(model(), kRays, 1 << 14);
+  AtlasStage stage(model(), TexelAtlas(model(), model().atlas()->faces, model().atlas()->patchEdge), kRays, 1 << 14);
   PhotoRays::Settings settings;
   settings.maxRays = kRays;
   PhotoRays rays(*device_, scene_.capture(), model().frame(), settings);

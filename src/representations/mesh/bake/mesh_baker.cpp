@@ -10,6 +10,7 @@
 
 #include "bake/levels.h"
 #include "base/check.h"
+#include "base/error.h"
 #include "base/image_io.h"
 #include "representations/mesh/content/fallback_mesh.h"
 #include "representations/mesh/content/mesh_payload.h"
@@ -50,6 +51,7 @@ class MeshBaker final : public Baker {
     grid_.edge /= tilesPerBlock_;
     grid_.columns *= static_cast<int>(tilesPerBlock_);
     grid_.rows *= static_cast<int>(tilesPerBlock_);
+    requireValidGrid();
   }
 
   SceneDescription description() const override {
@@ -66,13 +68,28 @@ class MeshBaker final : public Baker {
     photosToCome_ = static_cast<int64_t>(capture.photosIn(Split::train).size());
     passes_ = 0;
     for (const auto& part : mesh_.parts)
-      passes_ += (part->part().isBackground() ? 1 : levels_) - (part->atlas() ? 1 : 0);
+      for (uint32_t level = 0; level < (part->part().isBackground() ? 1 : levels_); ++level)
+        passes_ += isExtracted(*part, level) ? 1 : 0;
     for (uint32_t level = 0; level < levels_; ++level) bakeLevel(capture, level);
     for (const auto& part : mesh_.parts)
       if (part->part().isBackground()) bakeBackground(capture, *part);
   }
 
  private:
+  // Throws Error for what would be refused when the scene is written, after everything has been baked.
+  void requireValidGrid() const {
+    const std::string remedy = "bake with a lower --tiles-per-block";
+    const std::string what = fmt::format("--tiles-per-block {}", tilesPerBlock_);
+    if (description().near > 1)
+      throw Error(what, "", "the distance from cameras that has no triangles is longer than half a tile", remedy);
+    constexpr int kMaxAlong = 4096;
+    constexpr int64_t kMaxTiles = 40000;  // of the finest level; coarser ones add a third
+    if (grid_.columns > kMaxAlong || grid_.rows > kMaxAlong || int64_t{grid_.columns} * grid_.rows > kMaxTiles) {
+      throw Error(what, "", fmt::format("makes {} x {} tiles, more than a scene holds", grid_.columns, grid_.rows),
+                  remedy);
+    }
+  }
+
   // The blocks of a level, in tiles of cells of the scene's grid, which are pieces of a block or groups of blocks.
   void bakeLevel(const Capture& capture, uint32_t level) {
     const LevelGroups groups =
@@ -93,7 +110,7 @@ class MeshBaker final : public Baker {
                                      [&](const auto& each) { return each->part().block == block; });
       if (part != mesh_.parts.end()) {
         MeshModel& model = **part;
-        const BakedPatches baked = bakePart(capture, model, std::min(level, model.levels() - 1), level);
+        const BakedPatches baked = bakePart(capture, model, level);
         for (uint32_t patch = 0; patch < baked.patches(); ++patch) {
           const Vec3d at = sceneFromPart(model) * baked.centre(patch);
           patchesOfGroup[groupAt(groups, block, at)].push_back(patch);
@@ -109,7 +126,7 @@ class MeshBaker final : public Baker {
   }
 
   void bakeBackground(const Capture& capture, MeshModel& model) {
-    const BakedPatches baked = bakePart(capture, model, 0, 0);
+    const BakedPatches baked = bakePart(capture, model, 0);
     GrowingContent growing;
     growing.content.isBackground = true;
     growing.content.skyEdge = MeshModel::kSkyResolution;
@@ -126,21 +143,29 @@ class MeshBaker final : public Baker {
     finish(0, std::nullopt, growing);
   }
 
-  BakedPatches bakePart(const Capture& capture, MeshModel& model, uint32_t modelLevel, uint32_t sceneLevel) {
+  // The level of a part that a level of the scene shows: the coarsest, if it has fewer.
+  static uint32_t findModelLevel(MeshModel& model, uint32_t level) { return std::min(level, model.levels() - 1); }
+  // Whether the faces are not those of the final stage of training, so that the photos must be looked through.
+  static bool isExtracted(MeshModel& model, uint32_t level) {
+    return !model.atlas() || findModelLevel(model, level) > 0;
+  }
+
+  BakedPatches bakePart(const Capture& capture, MeshModel& model, uint32_t sceneLevel) {
+    const uint32_t level = findModelLevel(model, sceneLevel);
     MeshBakeSettings settings;
     settings.patchEdge = settings_.patchEdge;
     settings.baseColours = settings_.fallback;
-    if (const auto& atlas = model.atlas(); atlas && modelLevel == 0) {  // as it was trained
-      return bakePatches(model, 0, atlas->faces, settings);
+    if (!isExtracted(model, sceneLevel)) {
+      return bakePatches(model, 0, model.atlas()->faces, settings);
     }
     ExtractionSettings extraction;
     extraction.photoStride = options_.stride << sceneLevel;
     if (model.part().isBackground()) extraction.raysPerCell = 0;
-    const FaceSet faces = extractFaces(model, modelLevel, capture, nullptr, extraction, [this](int64_t done, int64_t) {
+    const FaceSet faces = extractFaces(model, level, capture, nullptr, extraction, [this](int64_t done, int64_t) {
       options_.onPhoto(passesDone_ * photosToCome_ + done, passes_ * photosToCome_);
     });
     ++passesDone_;
-    return bakePatches(model, modelLevel, faces, settings);
+    return bakePatches(model, level, faces, settings);
   }
 
   SceneFromPart sceneFromPart(const MeshModel& model) const {

@@ -13,7 +13,8 @@ inline constexpr uint32_t kMaxTilesPerBlock = 16;
 
 struct MeshSceneSettings {
   uint32_t patchEdge = 0;      // texels along the edge of a patch: 8 to 32, a multiple of 4; 0: as trained
-  uint32_t tilesPerBlock = 0;  // along an edge, at the finest level: a power of two; 0: one for each 32 cells
+  uint32_t tilesPerBlock = 0;  // along an edge, at the finest level: a power of two; 0: one for each 32 cells,
+                               // rounded down to a power of two
   bool fallback = true;        // every content has an ordinary mesh for other programs
 };
 

@@ -105,13 +105,16 @@ std::array<float, 3> skyColour(const MeshContent& content, const Vec3d& directio
 }
 
 uint64_t patchSetBytes(const PatchSet& set) {
-  return sizeof(PatchSet) + uint64_t{24} * set.patches +
-         set.textureBlocks() * (4 * PatchSet::kBc5Bytes + PatchSet::kBc4Bytes);
+  uint64_t bytes = sizeof(PatchSet) + uint64_t{24} * set.patches +
+                   set.textureBlocks() * (4 * PatchSet::kBc5Bytes + PatchSet::kBc4Bytes);
+  for (const DenseLayer& layer : set.decoder)
+    bytes += sizeof(DenseLayer) + sizeof(float) * ((layer.outputs + 7) / 8 * 8) * (uint64_t{layer.inputs} + 1);
+  return bytes;
 }
 
 uint64_t bytesInMemory(const MeshContent& content) {
   uint64_t bytes = sizeof(MeshContent) + uint64_t{18} * content.skyEdge * content.skyEdge;
-  for (const PatchSet& part : content.parts) bytes += patchSetBytes(part) + bytesInMemory(part.decoder);
+  for (const PatchSet& part : content.parts) bytes += patchSetBytes(part);
   return bytes;
 }
 

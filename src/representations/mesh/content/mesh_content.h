@@ -86,7 +86,8 @@ struct MeshContent {
 // Returns the colour of the sky in a direction; CHECKs that there is one.
 std::array<float, 3> skyColour(const MeshContent& content, const Vec3d& direction);
 
-// Returns the memory of a part in bytes without its network, of which only the numbers of patches and texels are read.
+// Returns the memory of a part in bytes, of which only the numbers of patches and texels and the sizes of the layers
+// are read. Outputs of layers count as rounded up to multiples of 8, as renderers round them.
 uint64_t patchSetBytes(const PatchSet& set);
 // Returns the bytes that a content takes in memory, as counted by the budgets of renderers.
 uint64_t bytesInMemory(const MeshContent& content);

@@ -91,9 +91,7 @@ class MeshReader {
       part.ranges[f] = {static_cast<float>((*ends)[0]), static_cast<float>((*ends)[1])};
     }
     if (!readLayers(getField(json, "network"), part.decoder, reason_)) return false;
-    bytes_ += patchSetBytes(part) + bytesInMemory(part.decoder);
-    for (const DenseLayer& layer : part.decoder)
-      bytes_ += sizeof(float) * (uint64_t{layer.inputs} * layer.outputs + layer.outputs);
+    bytes_ += patchSetBytes(part);
     return true;
   }
 

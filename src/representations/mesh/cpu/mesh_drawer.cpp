@@ -18,7 +18,11 @@ class PreparedMesh final : public Content {
     for (const PatchSet& part : mesh_.parts) decoders_.emplace_back(part.decoder, kMeshFeatures + kMeshHarmonics, 3);
   }
 
-  uint64_t memoryBytes() const override { return decoded_->memoryBytes() + tracer_.memoryBytes() + bytesOfNetworks(); }
+  uint64_t memoryBytes() const override {
+    uint64_t bytes = decoded_->memoryBytes() + tracer_.memoryBytes();
+    for (const DenseNetwork& decoder : decoders_) bytes += decoder.memoryBytes();
+    return bytes;
+  }
   std::optional<std::string> mismatchWith(const TileContent& declared) const override {
     return decoded_->mismatchWith(declared);
   }
@@ -32,11 +36,6 @@ class PreparedMesh final : public Content {
     std::vector<PatchTriangles> parts;
     for (const PatchSet& part : mesh.parts) parts.push_back(makePatchTriangles(part));
     return MeshTracer(parts);
-  }
-  uint64_t bytesOfNetworks() const {
-    uint64_t bytes = 0;
-    for (const PatchSet& part : mesh_.parts) bytes += 4 * bytesInMemory(part.decoder);  // rounded up to vectors
-    return bytes;
   }
 
   std::unique_ptr<Content> decoded_;

@@ -115,6 +115,21 @@ TEST_F(DrawMesh, EndsRaysAtModels) {
   EXPECT_NEAR(look(0, 0.5, 13).opacity, 1, 1e-6);
 }
 
+TEST_F(DrawMesh, TakesNoMoreMemoryThanItStatesForManyParts) {
+  for (const bool isEmpty : {false, true}) {
+    PatchSet set = squareSet(0, 0, 1, 1, 0, 0.5f, 255);
+    if (isEmpty) {
+      set.patches = set.pairs = 0;
+      set.vertices.clear();
+      set.featureBlocks.fill({});
+      set.opacityBlocks.clear();
+    }
+    MeshContent mesh{false, 0, {}, std::vector<PatchSet>(1000, set)};
+    const uint64_t decoded = bytesInMemory(mesh), stated = drawer_->residentBytes(decoded);
+    EXPECT_LE(prepare(std::move(mesh))->memoryBytes(), stated) << decoded << " bytes when decoded";
+  }
+}
+
 TEST_F(DrawMesh, TakesNoMoreMemoryThanItStates) {
   for (const uint32_t patches : {1u, 100u, 20000u}) {
     PatchSet set = squareSet(0, 0, 1, 1, 0, 0.5f, 255);

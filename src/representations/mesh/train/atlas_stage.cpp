@@ -27,10 +27,10 @@ struct AtlasStage::Step {
   Matrix<const float> colours = {};  // of the hits
 };
 
-AtlasStage::AtlasStage(MeshModel& model, uint32_t maxRays, uint32_t hitCapacity)
+AtlasStage::AtlasStage(MeshModel& model, TexelAtlas atlas, uint32_t maxRays, uint32_t hitCapacity)
     : model_(model),
       device_(model.device()),
-      atlas_(model, model.atlas()->faces, model.atlas()->patchEdge),
+      atlas_(std::move(atlas)),
       texelCapacity_(kTexelsPerHit * hitCapacity),
       hits_(model.device(), maxRays, hitCapacity) {
   ranges_ = device_.uploadArray(model.atlas()->ranges);
@@ -166,6 +166,7 @@ void AtlasStage::composite(const Step& step, PhotoLoss& photoLoss) {
   DitherLoss dither;
   dither.scale = static_cast<float>(kDitherWeight / (3.0 * step.count));
   dither.rays = step.finished;
+  dither.rayWeights = step.rays.weights(0, step.count);
   dither.firstSample = hits_.firstSample;
   dither.weights = sampleWeights_;
   dither.colours = step.colours;

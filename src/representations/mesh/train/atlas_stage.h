@@ -16,8 +16,8 @@ class AtlasStage {
   static constexpr uint32_t kLosses = PhotoLoss::kLosses + 1;     // of the photos, and of dithering
   static constexpr uint32_t kCounters = MeshHits::kCounters + 1;  // of hits, of rays, of texels
 
-  // `model` has an atlas; a reference to it is kept. hitCapacity: of a step.
-  AtlasStage(MeshModel& model, uint32_t maxRays, uint32_t hitCapacity);
+  // `atlas`: of the model's MeshAtlas. Keeps a reference to `model`. hitCapacity: of a step.
+  AtlasStage(MeshModel& model, TexelAtlas atlas, uint32_t maxRays, uint32_t hitCapacity);
 
   // Adds the gradients of a step's rays to those of the networks, the table and the sky. `losses`: [kLosses];
   // `counters`: [kCounters].

@@ -4,6 +4,15 @@
 
 namespace tessera {
 
+bool faceExists(OctahedraGrids grids, uint32_t face) {
+  const uint32_t n = grids[0].resolution, cell = face / kFacesPerCell % grids[0].cells();
+  const int place[3] = {static_cast<int>(cell % n), static_cast<int>(cell / n % n), static_cast<int>(cell / (n * n))};
+  for (const auto& corner : octahedronFace(face % kFacesPerCell))
+    for (int axis = 0; axis < 3; ++axis)
+      if (static_cast<uint32_t>(place[axis] + corner[axis]) >= n) return false;  // -1 wraps beyond the grid
+  return true;
+}
+
 void FaceSet::add(uint32_t face, const Vec3f& direction) {
   add(face);
   directions_.try_emplace(face, Vec3f::Zero()).first->second += direction;

@@ -9,6 +9,9 @@
 
 namespace tessera {
 
+// Whether a face, whose number is below that of all faces of the grids, has all vertices in its grid.
+bool faceExists(OctahedraGrids grids, uint32_t face);
+
 class FaceSet {
  public:
   FaceSet() = default;

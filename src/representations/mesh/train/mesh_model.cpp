@@ -1,6 +1,7 @@
 #include "representations/mesh/train/mesh_model.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/error.h"
 #include "base/random.h"
@@ -150,9 +151,12 @@ void MeshModel::restoreAtlas(const fs::path& path, const Safetensors& file) {
   const auto ranges = read("atlas.ranges", TensorType::f32).as<float>();
   const OctahedraDomain& domain = level(0).domain();
   const uint64_t all = uint64_t{kFacesPerCell} * domain.grids[0].cells() * domain.grids.size();
-  const bool isValid = edge.size() == 1 && edge[0] >= 2 && edge[0] <= 64 && directions.size() == 3 * faces.size() &&
-                       ranges.size() == 2 * MeshField::kFeatures &&
-                       std::all_of(faces.begin(), faces.end(), [&](uint32_t face) { return face < all; });
+  bool isValid = edge.size() == 1 && edge[0] == static_cast<uint32_t>(config_.patchTexels) &&
+                 directions.size() == 3 * faces.size() && ranges.size() == 2 * MeshField::kFeatures &&
+                 std::all_of(faces.begin(), faces.end(),
+                             [&](uint32_t face) { return face < all && faceExists(domain.grids, face); });
+  for (size_t f = 0; isValid && f < ranges.size(); f += 2)
+    isValid = std::isfinite(ranges[f]) && std::isfinite(ranges[f + 1]) && ranges[f] <= ranges[f + 1];
   if (!isValid) {
     throw Error(path.string(), "tensors atlas.*", "do not belong to these settings",
                 "restore the config.toml that the checkpoint was trained with, or train again");

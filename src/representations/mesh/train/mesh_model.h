@@ -40,6 +40,7 @@ class MeshModel {
   // Nothing before the final stage. From then on, rays hit its faces alone.
   const std::optional<MeshAtlas>& atlas() const { return atlas_; }
   void setAtlas(MeshAtlas atlas);
+  void setAtlasRanges(std::vector<float> ranges) { atlas_->ranges = std::move(ranges); }
   void removeAtlas();
 
   // The cube map of the sky behind the outside, CubeMapForward::texels.

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <unordered_map>
 
+#include "representations/mesh/train/face_set.h"
+
 namespace tessera {
 namespace {
 
@@ -31,11 +33,7 @@ TriangleList listTriangles(OctahedraGrids grids, OctahedraGrids owners, const st
       const int place[3] = {static_cast<int>(cell % n), static_cast<int>(cell / n % n),
                             static_cast<int>(cell / (n * n))};
       const auto corners = octahedronFace(local % kFacesPerCell);
-      bool exists = true;
-      for (const auto& corner : corners)
-        for (int axis = 0; axis < 3; ++axis)
-          exists = exists && static_cast<uint32_t>(place[axis] + corner[axis]) < n;  // -1 wraps beyond the grid
-      if (!exists) continue;
+      if (!faceExists(grids, face)) continue;
       std::array<uint32_t, 3> cellOfVertex{};
       std::array<Vec3d, 3> inGrid;
       for (int corner = 0; corner < 3; ++corner) {

@@ -40,6 +40,11 @@ std::vector<TrianglePatch> pairTriangles(const TriangleList& list);
 // one. `column`, `row`: in units of texels, T - 1 at the last.
 Vec3d texelPosition(const std::array<Vec3d, 4>& corners, bool isPair, double column, double row, uint32_t patchEdge);
 
+// Whether a texel of a patch is mixed into a place of one of its triangles.
+inline bool isTexelUsed(bool isPair, uint32_t column, uint32_t row, uint32_t patchEdge) {
+  return isPair || column + row <= patchEdge;
+}
+
 // Writes the position in the field, 3 numbers in [0, 1], of a point of the part's frame.
 void toFieldPosition(const OctahedraGrid& grid, const Vec3d& point, float* position);
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/log.h"
 #include "base/random.h"
 #include "compute/composite.h"
 #include "compute/cube_map.h"
@@ -89,7 +90,10 @@ bool MeshTrainer::isFinalStage(int64_t step, int64_t plannedSteps) const {
 }
 
 void MeshTrainer::beginFinalStage() {
+  bool atlasIsNew = false;
   if (!model_.atlas()) {
+    if (model_.levels() == 1)  // short trainings end before coarse levels begin
+      model_.addCoarseLevels(mix64(static_cast<uint64_t>(config_.seed)));
     ExtractionSettings extraction;
     if (model_.part().isBackground()) {
       extraction.raysPerCell = 0;
@@ -99,12 +103,16 @@ void MeshTrainer::beginFinalStage() {
     MeshAtlas atlas;
     atlas.patchEdge = static_cast<uint32_t>(config_.patchTexels);
     atlas.faces = extractFaces(model_, 0, capture_, &tiles_, extraction);
-    atlas.ranges = TexelAtlas(model_, atlas.faces, atlas.patchEdge).findRanges(model_);
+    if (atlas.faces.count() == 0) warn("{}: no triangle is opaque enough to be kept", model_.part().name);
+    atlas.ranges.resize(2 * MeshField::kFeatures);  // they are found below
     model_.setAtlas(std::move(atlas));
+    atlasIsNew = true;
   }
+  TexelAtlas texels(model_, model_.atlas()->faces, model_.atlas()->patchEdge);
+  if (atlasIsNew) model_.setAtlasRanges(texels.findRanges(model_));
   constexpr uint32_t kTexelsPerHit = 4, kLeastHits = 256;
   const uint32_t samples = static_cast<uint32_t>(config_.samplesPerStep);
-  finalStage_.emplace(model_, static_cast<uint32_t>(config_.maxRays),
+  finalStage_.emplace(model_, std::move(texels), static_cast<uint32_t>(config_.maxRays),
                       std::max(kLeastHits, kCapacityPerDemand * samples / kTexelsPerHit));
 }
 

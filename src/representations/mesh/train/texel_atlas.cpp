@@ -1,9 +1,12 @@
 #include "representations/mesh/train/texel_atlas.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "base/error.h"
 #include "compute/patches.h"
 
 namespace tessera {
@@ -31,7 +34,8 @@ TexelAtlas::TexelAtlas(MeshModel& model, const FaceSet& faces, uint32_t patchEdg
   const OctahedraDomain& domain = model.level(0).domain();
   const std::vector<float> displacements = model.device().read(model.level(0).displacements().values.all());
   const TriangleList own = listTriangles(domain.grids, domain.ownGrids, displacements, faces.bits());
-  FaceSet others = faces;
+  FaceSet others(domain.grids);
+  for (const uint32_t face : faces.numbers()) others.add(face);
   for (const uint32_t face : own.faceOfTriangle) others.remove(face);
   std::vector<uint32_t> patchOfFace(faceWords(domain.grids) * size_t{32}, kNoPatch);
   std::vector<float> factors, positions;
@@ -65,6 +69,7 @@ void TexelAtlas::addPatch(const OctahedraDomain& domain, const TriangleList& lis
     corners[corner] = list.vertices[c[corner]];
     factors.push_back(sceneFactor(domain.grids[patch.grid], corners[corner]));
   }
+  pairs_.push_back(patch.isPair);
   for (uint32_t texel = 0; texel < patchEdge_ * patchEdge_; ++texel) {
     std::array<float, 3> position{};
     toFieldPosition(domain.grids[patch.grid],
@@ -73,6 +78,10 @@ void TexelAtlas::addPatch(const OctahedraDomain& domain, const TriangleList& lis
     positions.insert(positions.end(), position.begin(), position.end());
   }
   texels_ += patchEdge_ * patchEdge_;
+  if (texels_ >= 1u << 31) {
+    throw Error(fmt::format("--set patch_texels={}", patchEdge_), "", "the part has more texels than fit the memory",
+                "use a lower number, or a lower --set mesh_cells");
+  }
 }
 
 std::vector<float> TexelAtlas::findRanges(MeshModel& model) const {
@@ -92,6 +101,10 @@ std::vector<float> TexelAtlas::findRanges(MeshModel& model) const {
                          Matrix<float>(features, kFeatures));
     const std::vector<float> some = device.read(features.part(0, size_t{kFeatures} * count));
     for (size_t texel = 0; texel < count; ++texel) {
+      const uint32_t number = first + static_cast<uint32_t>(texel), within = number % (patchEdge_ * patchEdge_);
+      if (!isTexelUsed(pairs_[number / (patchEdge_ * patchEdge_)], within % patchEdge_, within / patchEdge_,
+                       patchEdge_))
+        continue;
       if (1 / (1 + std::exp(-some[kFeatures * texel] - model.opacityOffset())) < kVisible) continue;
       for (size_t f = 0; f < kFeatures; ++f) {
         ranges[2 * f] = std::min(ranges[2 * f], some[kFeatures * texel + f]);

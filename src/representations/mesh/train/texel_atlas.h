@@ -27,6 +27,7 @@ class TexelAtlas {
                 std::vector<uint32_t>& patchOfFace, std::vector<float>& factors, std::vector<float>& positions);
 
   uint32_t patchEdge_, texels_ = 0;
+  std::vector<bool> pairs_;  // [patches]: whether a patch has two triangles
   Array<uint32_t> patchOfFace_;
   Array<float> cornerFactors_, positions_;
 };
