@@ -5,12 +5,22 @@
 #                and those in build/bench/mesh); and how long Embree takes for a new hierarchy after a step has moved the vertices
 #   city         a city of 2x2 blocks, 15 minutes with coarse field and final stage: held-out PSNR of the baked scene and of its
 #                levels, beside `field` in the same time; bytes, triangles and time of baking; its contents as glTF files
-#   final        the same city in the same time without the final stage, and what each step from its model to contents loses
+#   final        one block of the city with and without the final stage, in the same time, three seeds; the whole city likewise,
+#                once; what each step from its model to contents loses, and what opacities of 0 and 1 alone would
 #   holes        200 fresh views of that city from other heights: the share of pixels in which the scene's blocks have a hole, at the
 #                finest level and with levels mixed
+#   losses       one block with both losses and with the first alone, without the final stage, three seeds: PSNR of the scenes
+#   quads        one block of octahedra and of MobileNeRF's quads, in the same time, three seeds; also with equal numbers of
+#                triangles, without the final stage
+#   depth        one block with and without the loss of depths at sparse points, three seeds: errors of depth, PSNR
+#   borders      the error of the city's scene near walls between blocks against that elsewhere, and the same of a scene with one
+#                block in place of four
+#   processes    four blocks as four processes and one after another: equal bytes
+#   killed       killed at ten random moments, and baking at three: equal bytes
+#   vulkan       300 steps with `vulkan` against `cpu`: PSNR of the training photos
 #   fox, beach   real photographs, 10 minutes each: held-out PSNR of the baked scene
 # Resumable: everything is kept in build/bench/mesh, and what exists is not made again; remove traversal-* there to repeat a row.
-#   [ROWS="traversal city final holes fox beach"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
+#   [ROWS="traversal city final …"] [SEEDS="1 2 3"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
 # CAPTURE: the capture of MODEL, if it is not where its blocks.json says.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -58,20 +68,27 @@ chained() {
       mv "$file.part" "$file"
     fi
     jq -r --arg edge "$edge" '"patches of \($edge) texels: model \(.model.psnr), faces kept \(.kept_faces.psnr), " +
-      "8 bits \(.texels_of_8_bits.psnr), opaque from 0.8 \(.["opaque_from_0.8"].psnr), " +
+      "8 bits \(.texels_of_8_bits.psnr), opacities of 0 and 1 alone \(.["binarised_at_0.5"].psnr), " +
+      "as stored, opaque from 0.8 \(.["opaque_from_0.8"].psnr) with \(.["opaque_from_0.8"].hits_per_ray) hits a ray, " +
       "BC4 \(.bc4_fast.psnr), exhaustive \(.bc4_exhaustive.psnr) dB; \(.triangles) triangles, " +
       "\(.texel_bytes_bc4 / 1e6) MB of texels in BC4; extraction \(.extraction_seconds) s, baking \(.bake_seconds) s"' "$file"
   done
 }
 
-# scene MODEL CAPTURE: bakes the model, and prints what its scene has and how it looks.
-scene() {
-  local seconds=$SECONDS level
+# counted MODEL CAPTURE: bakes the model, and saves what its scene has.
+counted() {
+  local seconds=$SECONDS
   if [ ! -e "$work/$1.scene/tileset.json" ]; then
     "$tessera" bake "$work/$1" "$work/$1.scene" --capture "$work/$2" --json > "$work/$1.bake.json"
     jq --argjson seconds $((SECONDS - seconds)) '. + {seconds: $seconds}' "$work/$1.bake.json" > "$work/$1.part"
     mv "$work/$1.part" "$work/$1.bake.json"
   fi
+}
+
+# scene MODEL CAPTURE: bakes the model, and prints what its scene has and how it looks.
+scene() {
+  local level
+  counted "$1" "$2"
   for level in $(jq -r '.levels | keys[]' "$work/$1.bake.json"); do
     judged "$1.scene" "$2" "$level" > /dev/null
     jq -r --argjson level "$level" --slurpfile eval "$work/$1.scene-lod$level.json" '.levels[$level] | "level \($level): " +
@@ -101,8 +118,43 @@ city() {
   verdict "city 2x2, field less the scene in dB" "$(shortfall "$(judged city-field city)" "$(judged city-mesh.scene city 0)")" '<=' 1.5
 }
 
-final() {
+# block: one block of a city, for comparisons.
+block() {
   need_tessera
+  [ -e "$work/block/transforms.json" ] || "$tessera" synth city "$work/block" --blocks 1x1 --photos 26 --size 320x240
+}
+
+# seeded NAME ARGUMENTS...: trains that block for 5 minutes with each seed, bakes it, and prints the PSNR of each scene.
+seeded() {
+  local name=$1 seed
+  shift
+  for seed in ${SEEDS:-1 2 3}; do
+    trained "$name-$seed" block --method mesh --minutes 5 --seed "$seed" "$@" >&2
+    counted "$name-$seed" block >&2
+    judged "$name-$seed.scene" block 0
+  done
+}
+
+# gained WHAT NAME OTHER FIELD [NAME_OF_FILES]: prints the mean of the differences of a number between the same seeds of two
+# trainings, with its 95 % interval; `gain` is the mean.
+gained() {
+  local seed differences=()
+  for seed in ${SEEDS:-1 2 3}; do
+    differences+=("$(jq -n --slurpfile a "$work/$2-$seed${5:-.scene-lod0}.json" \
+      --slurpfile b "$work/$3-$seed${5:-.scene-lod0}.json" "(\$a[0]$4) - (\$b[0]$4)")")
+  done
+  local mean low high
+  read -r mean low high < <(interval "${differences[@]}")
+  echo "$1: $mean, 95 % interval $low to $high (${differences[*]})"
+  gain=$mean lowest=$low
+}
+
+final() {
+  block
+  echo "one block, 5 min: with the final stage" $(seeded final) "dB, without" $(seeded plain --set final_share=0) "dB"
+  gained "gain of the final stage, SSIM" final plain .ssim
+  gained "gain of the final stage in dB" final plain .psnr
+  verdict "one block, gain of the final stage in dB" "$gain" '>=' 0.3
   [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
   trained city-mesh city --method mesh --minutes 15
   scene city-mesh city
@@ -111,6 +163,156 @@ final() {
   verdict "city 2x2, gain of the final stage in dB" \
     "$(shortfall "$(judged city-mesh.scene city 0)" "$(judged city-plain.scene city 0)")" '>=' 0.3
   chained city-plain city
+}
+
+losses() {
+  block
+  echo "one block, 5 min: both losses" $(seeded plain --set final_share=0) "dB, the first alone" \
+    $(seeded first --set final_share=0 --set opaque_loss=false) "dB"
+  gained "gain of the second loss, SSIM" plain first .ssim
+  gained "gain of the second loss in dB" plain first .psnr
+  verdict "one block, gain of the second loss in dB" "$gain" '>=' 0.5
+}
+
+quads() {
+  block
+  echo "one block, 5 min: octahedra" $(seeded final) "dB, quads" $(seeded quads --set quads=true) "dB"
+  gained "octahedra less quads, SSIM" final quads .ssim
+  gained "octahedra less quads in dB" final quads .psnr
+  verdict "one block, octahedra less quads in dB, lower end of the interval" "$lowest" '>=' 0
+  seeded plain --set final_share=0 > /dev/null
+  seeded quads-plain --set final_share=0 --set quads=true > /dev/null
+  local seed faces name
+  for seed in ${SEEDS:-1 2 3}; do
+    faces=$(jq '.levels["0"].triangles' "$work/plain-$seed.bake.json" "$work/quads-plain-$seed.bake.json" | sort -n | head -1)
+    for name in plain quads-plain; do
+      [ -s "$work/$name-$seed.faces.json" ] || {
+        build/release/bench/mesh_chain "$work/$name-$seed" "$work/block" 8 "$faces" > "$work/faces.part"
+        mv "$work/faces.part" "$work/$name-$seed.faces.json"
+      }
+    done
+  done
+  gained "octahedra less quads with equal numbers of triangles in dB" plain quads-plain '["opaque_from_0.8"].psnr' .faces
+}
+
+depth() {
+  block
+  local seed name
+  seeded final > /dev/null
+  seeded no-depth --set depth_weight=0 > /dev/null
+  for name in final no-depth; do
+    for seed in ${SEEDS:-1 2 3}; do judged "$name-$seed" block > /dev/null; done
+  done
+  gained "gain of the loss of depths in dB" final no-depth .psnr
+  gained "median error of depth with the loss, less that without it" final no-depth .depth.median_absolute
+  verdict "one block, error of depth with the loss less that without it" "$gain" '<=' 0
+}
+
+# judged_at_borders SCENE CAPTURE BLOCKS: prints the error at walls relative to that elsewhere.
+judged_at_borders() {
+  [ -s "$work/$1.border.json" ] || {
+    build/release/bench/border_error "$work/$1" "$work/$2" "$work/$3/blocks.json" > "$work/border.part"
+    mv "$work/border.part" "$work/$1.border.json"
+  }
+  jq -r .mse_ratio "$work/$1.border.json"
+}
+
+borders() {
+  need_tessera
+  [ -x build/release/bench/border_error ] || die "build/release/bench/border_error: not built; run: tools/build.sh release border_error"
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  trained city-single city --method mesh --minutes 15 --blocks 1x1 --set mesh_cells=128
+  scene city-single city
+  local four one
+  four=$(judged_at_borders city-mesh.scene city city-mesh) one=$(judged_at_borders city-single.scene city city-mesh)
+  echo "city 2x2, squared error at walls relative to that elsewhere: four blocks $four, one block $one"
+  verdict "city 2x2, the same ratio of four blocks relative to that of one" "$(jq -n "$four / $one")" '<=' 1.05
+}
+
+# Small trainings whose bytes are compared.
+tiny() { # MODEL ARGUMENTS...
+  "$tessera" train "$work/tiny" "$work/$1" --method mesh --steps 120 --seed 7 --blocks 2x2 --set coarse_steps=60 \
+    --set samples_per_step=8192 --set mesh_cells=32 --set background_cells=32 "${@:2}"
+}
+tiny_city() {
+  need_tessera
+  [ -e "$work/tiny/transforms.json" ] || "$tessera" synth city "$work/tiny" --blocks 2x2 --photos 16 --size 160x120 --samples 2
+  [ -e "$work/tiny-one/manifest.json" ] || {
+    tiny tiny-one.part
+    mv "$work/tiny-one.part" "$work/tiny-one"
+  }
+}
+sums() { (cd "$1" && sha256sum parts/*/blocks/*.safetensors coarse/*.safetensors); }
+
+processes() {
+  tiny_city
+  rm -rf "$work/tiny-four"
+  tiny tiny-four --only-blocks coarse
+  tiny tiny-four --resume --only-blocks background
+  local block pids=()
+  for block in block_0_0 block_1_0 block_0_1 block_1_1; do
+    tiny tiny-four --resume --only-blocks "$block" --threads 1 &
+    pids+=($!)
+  done
+  wait "${pids[@]}"
+  verdict "four processes, files that differ from those of one process" \
+    "$(diff <(sums "$work/tiny-one") <(sums "$work/tiny-four") | grep -c '^>')" '<=' 0
+}
+
+# interrupted COMMAND...: runs it, and kills it after a random part of `lasted` seconds; succeeds if it was killed.
+interrupted() {
+  "$@" > "$work/interrupted.log" 2>&1 &
+  local pid=$!
+  sleep "$(awk -v l="$lasted" -v r="$RANDOM" 'BEGIN { printf "%.3f", 0.05 + l * r / 32768 }')"
+  kill -9 "$pid" 2> /dev/null || return 1
+  wait "$pid" 2> /dev/null || true
+}
+
+killed() {
+  tiny_city
+  local started=$SECONDS kills=0 lasted
+  rm -rf "$work/tiny-killed" "$work"/tiny-*.scene
+  tiny tiny-timed
+  lasted=$(((SECONDS - started) / 4 + 1))
+  rm -rf "$work/tiny-timed"
+  while [ "$kills" -lt 10 ]; do
+    if interrupted tiny tiny-killed --resume --checkpoint-seconds 0.3; then
+      kills=$((kills + 1))
+      echo "kill $kills: $(grep -a : "$work/interrupted.log" | tail -n 1)"
+    else
+      rm -rf "$work/tiny-killed"
+    fi
+  done
+  tiny tiny-killed --resume
+  verdict "killed ten times, files that differ" \
+    "$(diff <(sums "$work/tiny-one") <(sums "$work/tiny-killed") | grep -c '^>')" '<=' 0
+  started=$SECONDS
+  "$tessera" bake "$work/tiny-one" "$work/tiny-one.scene" --capture "$work/tiny"
+  lasted=$((SECONDS - started)) kills=0
+  while [ "$kills" -lt 3 ]; do
+    if interrupted "$tessera" bake "$work/tiny-one" "$work/tiny-killed.scene" --capture "$work/tiny"; then
+      kills=$((kills + 1))
+    else
+      rm -rf "$work/tiny-killed.scene"
+    fi
+  done
+  "$tessera" bake "$work/tiny-one" "$work/tiny-killed.scene" --capture "$work/tiny"
+  verdict "baking killed three times, files that differ" \
+    "$(diff -rq "$work/tiny-one.scene" "$work/tiny-killed.scene" | grep -vc bake.json)" '<=' 0
+}
+
+vulkan() {
+  block
+  local device
+  for device in cpu vulkan; do
+    trained "vulkan-$device" block --method mesh --steps 300 --set coarse_steps=300 --set samples_per_step=16384 --device "$device"
+    [ -s "$work/vulkan-$device.json" ] ||
+      "$tessera" eval "$work/vulkan-$device" "$work/block" --split train --json "$work/vulkan-$device.json" > /dev/null
+  done
+  verdict "300 steps, difference of training PSNR in dB" \
+    "$(difference "$(jq .psnr "$work/vulkan-cpu.json")" "$(jq .psnr "$work/vulkan-vulkan.json")")" '<=' 0.2
 }
 
 holes() {
@@ -144,5 +346,5 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city final holes fox beach}; do "$row"; done
+for row in ${ROWS:-traversal city final holes losses quads depth borders processes killed vulkan fox beach}; do "$row"; done
 finish

@@ -1,10 +1,12 @@
-// mesh_chain MODEL CAPTURE [PATCH_EDGE]: what each step from a trained mesh to its baked contents loses. Evaluates
-// held-out photos with the model; with the faces that extraction keeps; with the triangles of all parts and their
-// texels of 8 bits, traced by Embree; with opacities that are stored as opaque from 0.8 on; and of these, after BC4
-// compression. Prints PSNR, SSIM, and numbers of faces, patches and bytes as JSON. See mesh.sh.
+// mesh_chain MODEL CAPTURE [PATCH_EDGE [TRIANGLES]]: what each step from a trained mesh to its baked contents loses.
+// Evaluates held-out photos with the model; with the faces that extraction keeps; with the triangles of all parts and
+// their texels of 8 bits, traced by Embree; with opacities that are 0 or 1 alone; with those that contents store; and
+// with these after BC4 compression. At most TRIANGLES faces are kept, those that contribute most. Prints PSNR, SSIM,
+// hits per ray, and numbers of faces, patches and bytes as JSON. See mesh.sh.
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -52,12 +54,16 @@ class PatchesRenderer final : public ViewRenderer, private HitShading {
         const CompositedRay ray = trace(pose.translation, (pose.rotation * *inCamera).normalized());
         for (int c = 0; c < 3; ++c) view.colour.at(x, y)[c] = ray.colour[c];
         *view.opacity.at(x, y) = 1 - ray.transmittance;
+        ++rays_;
+        hits_ += ray.samples;
         *view.depth.at(x, y) = ray.depth * static_cast<float>(inCamera->normalized().z());
       }
     });
     return view;
   }
   std::string device() const override { return "Embree"; }
+  // Hits per ray whose colours were evaluated.
+  double hitsPerRay() const { return static_cast<double>(hits_) / static_cast<double>(std::max<uint64_t>(1, rays_)); }
 
  private:
   MeshTexel texel(const MeshHit& hit) const override {
@@ -113,10 +119,33 @@ class PatchesRenderer final : public ViewRenderer, private HitShading {
   std::vector<MeshTracer> tracers_;
   std::vector<DenseNetwork> decoders_;
   MeshContent sky_;  // only its sky
+  std::atomic<uint64_t> rays_ = 0, hits_ = 0;
   ThreadPool pool_{0};
 };
 
-nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& captureFolder, uint32_t patchEdge) {
+// Removes the faces that contribute least, until at most so many of all parts are left.
+void limitFaces(std::vector<FaceSet>& faces, size_t most) {
+  const auto reduced = [&](double share) {
+    std::vector<FaceSet> some = faces;
+    for (FaceSet& part : some) part.dropLeast(share);
+    return some;
+  };
+  const auto count = [](const std::vector<FaceSet>& sets) {
+    size_t sum = 0;
+    for (const FaceSet& part : sets) sum += part.count();
+    return sum;
+  };
+  if (count(faces) <= most) return;
+  double low = 0, high = 1;
+  for (int i = 0; i < 30; ++i) {
+    const double middle = (low + high) / 2;
+    (count(reduced(middle)) > most ? low : high) = middle;
+  }
+  faces = reduced(high);
+}
+
+nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& captureFolder, uint32_t patchEdge,
+                               size_t most) {
   using Clock = std::chrono::steady_clock;
   const auto seconds = [](Clock::time_point since) {
     return std::chrono::duration<double>(Clock::now() - since).count();
@@ -138,21 +167,28 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
   std::vector<FaceSet> faces;
   for (const auto& part : mesh.parts) {
     ExtractionSettings settings;
+    settings.droppedShare = part->config().droppedShare;
     if (part->part().isBackground()) settings.raysPerCell = 0;
     faces.push_back(extractFaces(*part, 0, capture, nullptr, settings));
     result["faces"].push_back(faces.back().count());
-    part->level(0).keepFaces(faces.back().bits());
   }
+  limitFaces(faces, most);
+  for (size_t i = 0; i < faces.size(); ++i) mesh.parts[i]->level(0).keepFaces(faces[i].bits());
   result["extraction_seconds"] = seconds(extracting);
   evaluateAs("kept_faces", renderer);
 
-  for (const bool snapped : {false, true}) {
+  struct Snapping {
+    const char* name;
+    float opaqueFrom, transparentBelow;
+  };
+  for (const Snapping& snapping :
+       {Snapping{"texels_of_8_bits", 2, 0}, Snapping{"binarised_at_0.5", 0.5f, 0.5f},
+        Snapping{"opaque_from_0.8", StoredOpacity::kOpaqueFrom, StoredOpacity::kTransparentBelow}}) {
     MeshBakeSettings settings;
     settings.patchEdge = patchEdge;
-    if (!snapped) {
-      settings.opaqueFrom = 2;
-      settings.transparentBelow = 0;
-    }
+    settings.opaqueFrom = snapping.opaqueFrom;
+    settings.transparentBelow = snapping.transparentBelow;
+    const bool isFirst = result.find("bake_seconds") == result.end();
     const auto baking = Clock::now();
     std::vector<BakedPatches> contents;
     uint64_t triangles = 0, patches = 0, pairs = 0;
@@ -162,7 +198,7 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
       patches += contents.back().patches();
       pairs += contents.back().pairs;
     }
-    if (!snapped) {
+    if (isFirst) {
       result["bake_seconds"] = seconds(baking);
       result["triangles"] = triangles;
       result["patches"] = patches;
@@ -171,8 +207,9 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
       result["texel_bytes_bc4"] = patches * patchEdge * patchEdge * BakedPatches::kNumbers / 2;
     }
     PatchesRenderer patchesRenderer(mesh, contents);
-    evaluateAs(snapped ? "opaque_from_0.8" : "texels_of_8_bits", patchesRenderer);
-    if (!snapped || patchEdge % 4 != 0) continue;
+    evaluateAs(snapping.name, patchesRenderer);
+    result[snapping.name]["hits_per_ray"] = patchesRenderer.hitsPerRay();
+    if (snapping.name != std::string("opaque_from_0.8") || patchEdge % 4 != 0) continue;
     for (const Bc4Effort effort : {Bc4Effort::fast, Bc4Effort::exhaustive}) {
       std::vector<BakedPatches> compressed = contents;
       const auto compressing = Clock::now();
@@ -192,12 +229,13 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::fprintf(stderr, "usage: mesh_chain MODEL CAPTURE [PATCH_EDGE]\n");
+    std::fprintf(stderr, "usage: mesh_chain MODEL CAPTURE [PATCH_EDGE [TRIANGLES]]\n");
     return 2;
   }
   try {
     const uint32_t patchEdge = argc > 3 ? static_cast<uint32_t>(std::atoi(argv[3])) : 8;
-    std::printf("%s\n", tessera::measure(argv[1], argv[2], patchEdge).dump(2).c_str());
+    const size_t most = argc > 4 ? static_cast<size_t>(std::atoll(argv[4])) : SIZE_MAX;
+    std::printf("%s\n", tessera::measure(argv[1], argv[2], patchEdge, most).dump(2).c_str());
     return 0;
   } catch (const tessera::Error& error) {
     std::fprintf(stderr, "mesh_chain: error: %s\n", error.what());

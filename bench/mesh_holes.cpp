@@ -22,6 +22,24 @@
 namespace tessera {
 namespace {
 
+// Draws the blocks alone: the background would hide holes.
+class BlocksDrawer final : public CpuDrawer {
+ public:
+  uint64_t residentBytes(uint64_t decodedBytes) const override { return drawer_->residentBytes(decodedBytes); }
+  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
+    return drawer_->prepare(std::move(content));
+  }
+  RenderedView draw(const SceneView<Content>& view, const ViewRequest& request, const DrawSettings& settings,
+                    ThreadPool& pool, DrawCounts& counts) override {
+    SceneView<Content> blocks = view;
+    blocks.backgroundBlock = nullptr;
+    return drawer_->draw(blocks, request, settings, pool, counts);
+  }
+
+ private:
+  std::unique_ptr<CpuDrawer> drawer_ = makeMeshDrawer();
+};
+
 nlohmann::ordered_json countHoles(const fs::path& folder, const fs::path& captureFolder, double screenSpaceError) {
   const Capture capture = readCapture(captureFolder);
   const Tileset tileset = readTileset(folder);
@@ -29,11 +47,11 @@ nlohmann::ordered_json countHoles(const fs::path& folder, const fs::path& captur
   const Mat4d worldFromCapture = tileset.sourceFromWorld.inverse() * capture.sourceFromWorld;
   TileScene scene = openTileScene(folder, meshCodec());
   const TileFrame frame = scene.frame;
-  scene.tree.backgroundBlock = -1;  // the background would hide holes
   const TileTree tree = scene.tree;
   SceneRendererSettings settings;
   settings.selection.maximumScreenSpaceError = screenSpaceError;
-  SceneRenderer renderer(makeMeshDrawer(), frame, std::move(scene.tree), std::move(scene.source), settings);
+  SceneRenderer renderer(std::make_unique<BlocksDrawer>(), frame, std::move(scene.tree), std::move(scene.source),
+                         settings);
   uint64_t surfaces = 0, holes = 0, views = 0;
   std::set<int> levels;
   std::vector<double> shares;

@@ -12,10 +12,13 @@ struct BackgroundBlockSettings {
           anything());  // see parseBackgroundBlockMode
 };
 
-struct BlockSettings : BackgroundBlockSettings {
+struct PresetSettings {
   // `cpu` selects the defaults, `paper` the values of the method's paper, for large GPUs.
   SETTING(std::string, preset, "cpu", "preset", "preset of all other defaults: cpu, or paper (for large GPUs)",
           anything());
+};
+
+struct BlockSettings : BackgroundBlockSettings, PresetSettings {
   SETTING(int, lod, 0, "lod", "level of detail: 0 is the finest; set by training for coarser levels", within(0, 16));
   SETTING(int64_t, finestStep, 0, "finest_step",
           "of a coarser level: steps of the finest one when it was created; set by training", anything());

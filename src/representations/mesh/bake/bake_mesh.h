@@ -7,10 +7,9 @@
 namespace tessera {
 
 struct MeshBakeSettings {
-  uint32_t patchEdge = 8;          // texels along the edge of a patch
-  float opaqueFrom = 0.8f;         // from this opacity on, texels are stored as opaque
-  float transparentBelow = 0.02f;  // below, as transparent
-  bool baseColours = false;        // for an ordinary mesh: colours as the training photos see them on average
+  uint32_t patchEdge = 8;  // texels along the edge of a patch
+  float opaqueFrom = StoredOpacity::kOpaqueFrom, transparentBelow = StoredOpacity::kTransparentBelow;
+  bool baseColours = false;  // for an ordinary mesh: colours as the training photos see them on average
 };
 
 // Bakes the given faces of a level. A texel of a coarse level is the mean of the encoder's output at several places in

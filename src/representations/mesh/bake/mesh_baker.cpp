@@ -160,6 +160,7 @@ class MeshBaker final : public Baker {
     }
     ExtractionSettings extraction;
     extraction.photoStride = options_.stride << sceneLevel;
+    extraction.droppedShare = model.config().droppedShare;
     if (model.part().isBackground()) extraction.raysPerCell = 0;
     const FaceSet faces = extractFaces(model, level, capture, nullptr, extraction, [this](int64_t done, int64_t) {
       options_.onPhoto(passesDone_ * photosToCome_ + done, passes_ * photosToCome_);

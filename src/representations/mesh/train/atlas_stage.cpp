@@ -120,8 +120,8 @@ void AtlasStage::lookUp(const Step& step) {
   StoreTexelsForward store;
   store.rows = step.texels;
   store.offset = model_.opacityOffset();
-  store.opaqueFrom = kOpaqueFrom;
-  store.transparentBelow = kTransparentBelow;
+  store.opaqueFrom = StoredOpacity::kOpaqueFrom;
+  store.transparentBelow = StoredOpacity::kTransparentBelow;
   store.features = field.encodedFeatures();
   store.ranges = ranges_;
   store.stored = Matrix<float>(stored_, kStored);

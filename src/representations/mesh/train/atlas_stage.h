@@ -11,8 +11,6 @@ namespace tessera {
 
 class AtlasStage {
  public:
-  // Opacities of at least `kOpaqueFrom` are stored as 1, those below `kTransparentBelow` as 0.
-  static constexpr float kOpaqueFrom = 0.8f, kTransparentBelow = 0.02f;
   static constexpr uint32_t kLosses = PhotoLoss::kLosses + 1;     // of the photos, and of dithering
   static constexpr uint32_t kCounters = MeshHits::kCounters + 1;  // of hits, of rays, of texels
 

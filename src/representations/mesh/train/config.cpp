@@ -7,12 +7,31 @@
 
 namespace tessera {
 
+MeshConfig MeshConfig::ofPreset(const std::string& name) {
+  MeshConfig config;
+  config.preset = name;
+  if (name == "cpu") return config;
+  if (name != "paper") throw Error("--set preset=" + name, "", "there is no such preset", "use cpu or paper");
+  config.backgroundBlock = "none";
+  config.gridLog2Size = 19;
+  config.gridFinest = 2048;
+  config.hidden = 3;
+  config.meshCells = 128;
+  config.everyCell = true;
+  config.surfaceStart = false;
+  config.networkL2 = config.distortionWeight = config.finalShare = config.droppedShare = 0;
+  config.exposure = false;
+  config.patchTexels = 32;
+  return config;
+}
+
 MeshConfig::MeshConfig() {
   setOwnDefaults(fields());
 }
 
 std::vector<ConfigField> MeshConfig::fields() {
   return {
+      presetSetting(),
       backgroundBlockSetting(),
       coarseStepsSetting(),
       coarseShareSetting(),
@@ -28,6 +47,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       backgroundCellsSetting(),
       meshLevelsSetting(),
       everyCellSetting(),
+      quadsSetting(),
       opacityOffsetSetting(),
       nearSetting().within(0, ConfigBounds::kHuge),
       seedSetting(),
@@ -44,6 +64,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       constantLearningRateFractionSetting(),
       networkL2Setting(),
       vertexLearningRateSetting(),
+      surfaceStartSetting(),
       vertexStartStepsSetting(),
       minCosineSetting(),
       exposureLearningRateSetting(),
@@ -51,6 +72,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       lossParameterSetting(),
       opaqueLossSetting(),
       finalShareSetting(),
+      droppedShareSetting(),
       patchTexelsSetting(),
       distortionWeightSetting().byDefault(0.02),
       depthWeightSetting(),
@@ -62,6 +84,7 @@ std::vector<ConfigField> MeshConfig::fields() {
 }
 
 void MeshConfig::check() const {
+  ofPreset(preset);
   MeshConfig checked = *this;
   requireWithinBounds(checked.fields());
   if (backgroundBlock == "own" || backgroundBlock == "none") return;
@@ -93,7 +116,7 @@ int64_t MeshConfig::stepsBeforeFinalStage(int64_t plannedSteps) const {
 
 OctahedraDomain MeshConfig::domain(const MeshPart& part, uint32_t level) const {
   return makeOctahedraDomain(part, static_cast<uint32_t>(part.isBackground() ? backgroundCells : meshCells) >> level,
-                             everyCell ? OctahedraPlacement::all : OctahedraPlacement::checkerboard);
+                             everyCell || quads ? OctahedraPlacement::all : OctahedraPlacement::checkerboard);
 }
 
 }  // namespace tessera

@@ -13,6 +13,7 @@
 namespace tessera {
 
 struct MeshConfig : BackgroundBlockSettings,
+                    PresetSettings,
                     RaySettings,
                     RandomBackgroundSettings,
                     SampleBudgetSettings,
@@ -45,6 +46,10 @@ struct MeshConfig : BackgroundBlockSettings,
   SETTING(bool, everyCell, false, "every_cell",
           "every cell carries an octahedron, as the paper's text says; else every second one, so that none overlap",
           anything());
+  SETTING(bool, quads, false, "quads",
+          "a comparison: in place of octahedra, the quads of MobileNeRF's grid, four vertices around each edge of the "
+          "lattice",
+          anything());
   SETTING(double, opacityOffset, -6, "opacity_offset", "added to the logit of opacity; nearly transparent at the start",
           within(-20, 20));
   // Training
@@ -55,6 +60,9 @@ struct MeshConfig : BackgroundBlockSettings,
           "what remains of a cell's occupancy after an update unless a ray reaches a hit in it", share());
   SETTING(double, vertexLearningRate, 8e-3, "vertex_learning_rate",
           "learning rate of the vertices, in edges of a cell; falls to a hundredth", atLeast(0));
+  SETTING(bool, surfaceStart, true, "surface_start",
+          "vertices start where the coarse field has a surface in their cell; else in the middle of the cell",
+          anything());
   SETTING(int, vertexStartSteps, 200, "vertex_start_steps", "steps before the vertices begin to move",
           within(0, 1 << 30));
   SETTING(double, minCosine, 0.1, "min_cosine",
@@ -63,9 +71,16 @@ struct MeshConfig : BackgroundBlockSettings,
   SETTING(double, finalShare, 0.2, "final_share",
           "share of the steps for the final stage, which trains through texels as they are baked; 0: none",
           within(0, 0.9));
+  SETTING(double, droppedShare, 0.005, "dropped_share",
+          "of what all triangles contribute to the rays of photos and those from above: the triangles with the least, "
+          "which have this share together, are dropped",
+          within(0, 0.5));
   SETTING(int, patchTexels, 8, "patch_texels", "texels along the edge of a patch of two triangles",
           within(8, 32).withDivisor(4, 0));
 
+  // Returns the settings of a preset; `paper` is meant for 80,000 steps. Throws Error if there is no preset of that
+  // name.
+  static MeshConfig ofPreset(const std::string& name);
   MeshConfig();
   // In the order of config.toml.
   std::vector<ConfigField> fields();

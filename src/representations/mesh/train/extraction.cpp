@@ -99,7 +99,8 @@ uint32_t FaceMarker::mark(const MeshRays& rays, float weight) {
     const Vec3f direction = Vec3f(directions[3 * ray], directions[3 * ray + 1], directions[3 * ray + 2]).normalized();
     for (uint32_t i = first[ray]; i < first[ray + 1] && 1 - transmittance <= settings_.maxOpacity; ++i) {
       const float opacity = 1 / (1 + std::exp(-logits[i] - model_.opacityOffset()));
-      if (opacity >= settings_.minOpacity) faces_.add(faces[i], weight * transmittance * opacity * direction);
+      if (opacity >= settings_.minOpacity)
+        faces_.add(faces[i], weight * transmittance * opacity * direction, transmittance * opacity);
       transmittance *= 1 - opacity;
     }
   }
@@ -143,7 +144,9 @@ FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, c
       }
     }
   }
-  return marker.faces();
+  FaceSet faceSet = marker.faces();
+  faceSet.dropLeast(settings.droppedShare);
+  return faceSet;
 }
 
 }  // namespace tessera

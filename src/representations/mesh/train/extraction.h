@@ -15,6 +15,7 @@ struct ExtractionSettings {
   float minOpacity = 0.3f;  // of a hit that keeps its face
   float maxOpacity = 0.8f;  // accumulated opacity beyond which a ray sees no further face
   int photoStride = 1;      // every photoStride-th pixel of a photo, along both axes
+  double droppedShare = 0;  // of all contributions: the faces with the least are dropped
   // Parallel rays: straight down, and from 8 directions each at 60°, 45° and 30° above the horizon; none with 0.
   double raysPerCell = 2;  // along an edge of a cell
 };

@@ -1,5 +1,6 @@
 #include "representations/mesh/train/face_set.h"
 
+#include <algorithm>
 #include <bit>
 
 namespace tessera {
@@ -13,9 +14,42 @@ bool faceExists(OctahedraGrids grids, uint32_t face) {
   return true;
 }
 
-void FaceSet::add(uint32_t face, const Vec3f& direction) {
+void FaceSet::add(uint32_t face, const Vec3f& direction, float contribution) {
   add(face);
-  directions_.try_emplace(face, Vec3f::Zero()).first->second += direction;
+  Seen& seen = seen_[face];
+  seen.direction += direction;
+  seen.contribution += contribution;
+}
+
+void FaceSet::dropLeast(double share) {
+  if (share <= 0) return;
+  const auto contribution = [&](uint32_t face) {
+    const auto entry = seen_.find(face);
+    return entry == seen_.end() ? 0 : entry->second.contribution;
+  };
+  std::vector<uint32_t> faces = numbers();
+  double rest = 0;
+  for (const uint32_t face : faces) rest += share * contribution(face);
+  std::stable_sort(faces.begin(), faces.end(),
+                   [&](uint32_t a, uint32_t b) { return contribution(a) < contribution(b); });
+  for (const uint32_t face : faces) {
+    rest -= contribution(face);
+    if (rest < 0) return;
+    remove(face);
+    seen_.erase(face);
+  }
+}
+
+FaceSet FaceSet::quads(OctahedraGrids grids) {
+  FaceSet quads(grids);
+  for (uint32_t cell = 0; cell < grids[0].cells() * grids.size(); ++cell) {
+    for (uint32_t local = kOuterFaces; local < kFacesPerCell; ++local) {
+      const uint32_t signs = (local - kOuterFaces) % 4;
+      if (signs == 0 || signs == 3)
+        quads.add(kFacesPerCell * cell + local);  // c, c + a, c + b; c + a + b, c + b, c + a
+    }
+  }
+  return quads;
 }
 
 size_t FaceSet::count() const {
@@ -25,8 +59,8 @@ size_t FaceSet::count() const {
 }
 
 Vec3f FaceSet::direction(uint32_t face) const {
-  const auto entry = directions_.find(face);
-  return entry == directions_.end() ? Vec3f(Vec3f::Zero()) : entry->second;
+  const auto entry = seen_.find(face);
+  return entry == seen_.end() ? Vec3f(Vec3f::Zero()) : entry->second.direction;
 }
 
 std::vector<uint32_t> FaceSet::numbers() const {

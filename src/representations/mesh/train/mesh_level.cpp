@@ -38,6 +38,7 @@ MeshLevel::MeshLevel(Device& device, uint32_t number, OctahedraDomain domain, co
       occupancy_(device, occupancySpace(domain_)),
       tracedCells_(device.array<uint32_t>(domain_.grids.size() * domain_.grids[0].words())) {
   CHECK(displacements.size() == size_t{3} * domain_.grids[0].cells() * domain_.grids.size());
+  keepFaces({});
   updateTracedCells();
 }
 
@@ -72,7 +73,7 @@ void MeshLevel::trace(const MeshRays& rays, uint32_t maximum, bool inOwn, MeshHi
 
 void MeshLevel::keepFaces(const std::vector<uint32_t>& bits) {
   CHECK((bits.empty() || bits.size() == faceWords(domain_.grids)));
-  keptFaces_ = device_.uploadArray(bits);
+  keptFaces_ = device_.uploadArray(bits.empty() && settings_.quads ? FaceSet::quads(domain_.grids).bits() : bits);
 }
 
 void MeshLevel::limitToFaces(const FaceSet& faces) {

@@ -37,6 +37,7 @@ class MeshLevel {
     float minCosine = 0.1f;    // OctahedraBackward::minCosine
     float opacityOffset = 0;   // added to logits
     float occupancyDecay = 1;  // per update
+    bool quads = false;        // rays hit only FaceSet::quads
   };
   // `number`: 0 is the finest. displacements: [grids][cells][3]. All cells are occupied. Keeps a reference to `device`.
   MeshLevel(Device& device, uint32_t number, OctahedraDomain domain, const Settings& settings,
@@ -45,7 +46,7 @@ class MeshLevel {
   // Finds the hits of rays in traced cells; each ray keeps its nearest `maximum`. `inOwn`: only within the domain's
   // ownGrids.
   void trace(const MeshRays& rays, uint32_t maximum, bool inOwn, MeshHits& hits);
-  // From now on, rays hit only these faces (bits, TraceOctahedra::keptFaces); all faces if empty.
+  // From now on, rays hit only these faces (bits, TraceOctahedra::keptFaces); all if empty.
   void keepFaces(const std::vector<uint32_t>& bits);
   // From now on, rays hit only these faces, and all of each, whatever cells are occupied: occupancy plays no role any
   // more.

@@ -45,6 +45,7 @@ std::unique_ptr<MeshLevel> MeshModel::makeLevel(uint32_t number, const std::vect
   settings.minCosine = static_cast<float>(config_.minCosine);
   settings.opacityOffset = opacityOffset();
   settings.occupancyDecay = static_cast<float>(config_.occupancyDecay);
+  settings.quads = config_.quads;
   return std::make_unique<MeshLevel>(device_, number, domain(number), settings, displacements);
 }
 

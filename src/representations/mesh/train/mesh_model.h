@@ -12,6 +12,12 @@
 
 namespace tessera {
 
+// How the opacities of texels are stored.
+struct StoredOpacity {
+  static constexpr float kOpaqueFrom = 0.8f;        // from it on, as 1
+  static constexpr float kTransparentBelow = 0.3f;  // below, as 0
+};
+
 // What the final stage of training fixes: the faces of the finest level that are drawn, and how their texels are
 // stored.
 struct MeshAtlas {

@@ -7,6 +7,22 @@
 namespace tessera {
 namespace {
 
+TEST(FaceSet, DropsTheFacesThatContributeLeast) {
+  const OctahedraGrid grid{8};
+  const auto remaining = [&](double share) {
+    FaceSet faces({&grid, 1});
+    for (const auto& [face, contribution] : {std::pair{7u, 2.0f}, {5u, 0.0f}, {40u, 3.5f}, {9u, 1.0f}, {11u, 3.5f}})
+      faces.add(face, Vec3f::UnitX(), contribution);
+    faces.dropLeast(share);
+    return faces.numbers();
+  };
+  EXPECT_EQ(remaining(0), (std::vector<uint32_t>{5, 7, 9, 11, 40}));
+  EXPECT_EQ(remaining(0.05), (std::vector<uint32_t>{7, 9, 11, 40}));
+  EXPECT_EQ(remaining(0.29), (std::vector<uint32_t>{7, 11, 40}));
+  EXPECT_EQ(remaining(0.31), (std::vector<uint32_t>{11, 40}));
+  EXPECT_EQ(remaining(0.66), (std::vector<uint32_t>{40})) << "of equal ones the first";
+}
+
 // A strip of triangles (0, 1, 2), (1, 2, 3), (2, 3, 4), …, folded by 90° between the second and the third.
 TriangleList foldedStrip() {
   TriangleList list;

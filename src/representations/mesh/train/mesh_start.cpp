@@ -72,10 +72,63 @@ SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse)
       }
     }
   }
+  addSurface(capture, renderer);
   CullOptions options;
   options.stride = kPhotoStride;
   renderer.cullUnseen(capture, options);
   cells_ = coarse.device().read(renderer.cells());
+}
+
+void SurfaceSurvey::addSurface(const Capture& capture, FieldRenderer& renderer) {
+  constexpr double kMaxPoints = 1 << 22;
+  constexpr float kSolid = 0.9f;  // less opaque pixels may show several surfaces
+  double pixels = 0;
+  for (const int photo : capture.photosIn(Split::train)) {
+    const Camera& camera = capture.cameras[capture.photos[photo].camera];
+    pixels += static_cast<double>(camera.width) * camera.height;
+  }
+  const double stride = std::max<double>(kPhotoStride, std::sqrt(pixels / kMaxPoints));
+  for (const int photo : capture.photosIn(Split::train)) {
+    const Pose& pose = capture.photos[photo].worldFromCamera;
+    const Camera& camera = capture.cameras[capture.photos[photo].camera];
+    const auto scaled = [&](int length) { return std::max(1, static_cast<int>(length / stride)); };
+    const Camera small = camera.scaledTo(scaled(camera.width), scaled(camera.height));
+    const RenderedView view = renderer.render(small, pose, nullptr);
+    for (int y = 0; y < small.height; ++y) {
+      for (int x = 0; x < small.width; ++x) {
+        const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
+        const float opacity = *view.opacity.at(x, y);
+        if (!inCamera || inCamera->z() <= 0 || opacity < kSolid) continue;
+        const Vec3d at =
+            pose.translation + pose.rotation * (*inCamera / inCamera->z() * (*view.depth.at(x, y) / opacity));
+        surface_.push_back(frame_.sceneFromWorld(at).cast<float>());
+      }
+    }
+  }
+}
+
+void SurfaceSurvey::findDisplacements(const OctahedraDomain& domain, const MeshPart& part, MeshStart& start) const {
+  constexpr uint32_t kLeastPoints = 3;
+  constexpr float kReach = 0.9f * kMaxDisplacement;
+  const OctahedraGrid& grid = domain.grids[0];
+  std::vector<Vec3d> sums(grid.cells(), Vec3d::Zero());
+  std::vector<uint32_t> counts(grid.cells());
+  for (const Vec3f& point : surface_) {
+    const Vec3d at = part.frame.sceneFromWorld(frame_.worldFromScene(point.cast<double>()));
+    const auto cell = domain.latticeCell(at);
+    if (!cell) continue;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float* const m = grid.gridFromScene.data() + size_t{4} * axis;
+      const double inGrid = m[0] * at.x() + m[1] * at.y() + m[2] * at.z() + m[3];
+      sums[*cell][axis] += inGrid - std::floor(inGrid) - 0.5;
+    }
+    ++counts[*cell];
+  }
+  start.displacements.assign(size_t{3} * grid.cells(), 0);
+  for (size_t cell = 0; cell < counts.size(); ++cell)
+    for (int axis = 0; axis < 3 && counts[cell] >= kLeastPoints; ++axis)
+      start.displacements[3 * cell + axis] =
+          std::clamp(static_cast<float>(sums[cell][axis] / counts[cell]), -kReach, kReach);
 }
 
 MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& domain) const {
@@ -113,6 +166,7 @@ MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& 
     }
   }
 
+  if (!part.isBackground()) findDisplacements(domain, part, start);
   // An occupancy has at least one cell; this one is for what shows the sky alone.
   if (part.isBackground() && std::find(start.cells.begin(), start.cells.end(), true) == start.cells.end())
     start.cells.front() = true;

@@ -8,11 +8,15 @@
 
 namespace tessera {
 
+class FieldRenderer;
+
 // Where the training of one part starts.
 struct MeshStart {
-  std::vector<bool> cells;        // [cells of the lattice] of the finest level
-  std::vector<TileShares> tiles;  // [photo]; only training photos have some
-  double pixelWidth = 0;          // of a photo on the surfaces, the median, units of the part; 0: unknown
+  std::vector<bool> cells;           // [cells of the lattice] of the finest level
+  std::vector<float> displacements;  // of a block's vertices, [cells][3] in edges of a cell: to the surface that photos
+                                     // see in the cell; empty: none
+  std::vector<TileShares> tiles;     // [photo]; only training photos have some
+  double pixelWidth = 0;             // of a photo on the surfaces, the median, units of the part; 0: unknown
 
   // Nothing can be trained without both.
   bool isEmpty() const;
@@ -39,10 +43,14 @@ class SurfaceSurvey {
     double pixelWidth = 0;  // on the surface, in world units
   };
 
+  void addSurface(const Capture& capture, FieldRenderer& renderer);
+  void findDisplacements(const OctahedraDomain& domain, const MeshPart& part, MeshStart& start) const;
+
   SceneFrame frame_;  // of the coarse field
   MarchSpace space_;
   std::vector<uint32_t> cells_;  // of the coarse field, in which photos see something; bits
   std::vector<Sight> sights_;    // by photo
+  std::vector<Vec3f> surface_;   // points that pixels of photos show, in the frame of the coarse field
   size_t photoCount_;
 };
 

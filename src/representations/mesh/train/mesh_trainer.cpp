@@ -57,6 +57,8 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
       photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config) {
   model_.level(0).exclude(start.cells);
+  if (config.surfaceStart && !start.displacements.empty())
+    device.write(model_.level(0).displacements().values.all(), std::span<const float>(start.displacements));
   tiles_ = start.tiles;
   pixelWidth_ = start.pixelWidth;
   photoRays_.drawFrom(std::move(start.tiles));
@@ -100,6 +102,7 @@ void MeshTrainer::beginFinalStage() {
     } else {
       extraction.photoStride = findPhotoStride(pixelWidth_, model_.level(0).domain());
     }
+    extraction.droppedShare = config_.droppedShare;
     MeshAtlas atlas;
     atlas.patchEdge = static_cast<uint32_t>(config_.patchTexels);
     atlas.faces = extractFaces(model_, 0, capture_, &tiles_, extraction);

@@ -197,6 +197,34 @@ TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
           missing += !start.cells[*cell];
         }
   EXPECT_LE(missing, all / 20);
+  // In cells that photos see, vertices start near the cube's surface, not in the middle of their cells. Those at its
+  // edges, where the mean of its points is within it, are left out.
+  const OctahedraDomain wide = makeOctahedraDomain(block, 20, OctahedraPlacement::checkerboard);
+  const std::vector<float> displacements = survey.findStart(block, wide).displacements;
+  double fromSurface = 0, fromMiddle = 0;
+  size_t moved = 0;
+  const OctahedraGrid& grid = wide.grids[0];
+  for (uint32_t cell = 0; cell < grid.cells(); ++cell) {
+    const float* const d = &displacements[size_t{3} * cell];
+    if (d[0] == 0 && d[1] == 0 && d[2] == 0) continue;
+    Vec3d middle, vertex;  // from the centre of the cube
+    for (uint32_t axis = 0, rest = cell; axis < 3; ++axis, rest /= grid.resolution) {
+      const double unit = grid.gridFromScene[5 * axis], half = grid.gridFromScene[4 * axis + 3],
+                   at = rest % grid.resolution + 0.5;
+      middle[axis] = (at - half) / unit;
+      vertex[axis] = (at + d[axis] - half) / unit;
+    }
+    middle = block.frame.worldFromScene(middle) - CubeScene::centre();
+    vertex = block.frame.worldFromScene(vertex) - CubeScene::centre();
+    int axis = 0;
+    middle.cwiseAbs().maxCoeff(&axis);
+    if (std::max(std::abs(middle[(axis + 1) % 3]), std::abs(middle[(axis + 2) % 3])) > 0.3) continue;
+    fromMiddle += std::abs(std::abs(middle[axis]) - 0.5);
+    fromSurface += std::abs(std::abs(vertex[axis]) - 0.5);
+    ++moved;
+  }
+  EXPECT_GT(moved, 20u);
+  EXPECT_LT(fromSurface, 0.7 * fromMiddle) << moved << " vertices";
   // Photos are transparent around the cube, so only the tiles on it are used.
   for (const int photo : scene.capture().photosIn(Split::train)) {
     const double share = start.tiles[photo].total() / (CubeScene::kWidth * CubeScene::kHeight);
@@ -213,6 +241,34 @@ TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
   MeshPart beside = block;
   beside.frame.centre += beside.frame.worldFromScene({3, 0, 0}) - beside.frame.worldFromScene({0, 0, 0});
   EXPECT_EQ(survey.findStart(beside, makeOctahedraDomain(beside, 32, OctahedraPlacement::checkerboard)).pixels(), 0);
+}
+
+TEST(MeshModel, HasOnlyQuadsIfRequested) {
+  const auto device = makeDevice({"cpu", 1});
+  MeshConfig config = smallMeshConfig();
+  config.quads = true;
+  MeshModel model(*device, config, {"block_0_0", 0, {}, {1, 1, 1}});
+  MeshLevel& level = model.level(0);
+  // The vertices are in the middles of cells, so a ray straight down meets one quad in each layer of cells.
+  const Array<float> origins = device->uploadArray(std::vector<float>{0.07f, 0.05f, 3}),
+                     directions = device->uploadArray(std::vector<float>{0, 0, -1});
+  const uint32_t layers = static_cast<uint32_t>(config.meshCells);
+  MeshHits hits(*device, 1, 4 * layers);
+  Array<uint32_t> counters = device->array<uint32_t>(MeshHits::kCounters);
+  hits.counters = counters;
+  const auto trace = [&] {
+    level.trace({1, origins, directions, {}}, 4 * layers, false, hits);
+    return device->read(counters.all())[0];
+  };
+  ASSERT_EQ(trace(), layers);
+  const FaceSet quads = FaceSet::quads(level.domain().grids);
+  for (const uint32_t face : device->read(hits.faces.part(0, layers))) EXPECT_TRUE(quads.contains(face));
+  FaceSet one(level.domain().grids);
+  one.add(device->read(hits.faces.part(0, 1))[0]);
+  level.limitToFaces(one);
+  EXPECT_EQ(trace(), 1u);
+  level.removeLimit();
+  EXPECT_EQ(trace(), layers) << "not the other faces of octahedra";
 }
 
 TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {

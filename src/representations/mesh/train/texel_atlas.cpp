@@ -86,7 +86,6 @@ void TexelAtlas::addPatch(const OctahedraDomain& domain, const TriangleList& lis
 
 std::vector<float> TexelAtlas::findRanges(MeshModel& model) const {
   constexpr uint32_t kFeatures = MeshField::kFeatures;
-  constexpr float kVisible = 0.02f;
   Device& device = model.device();
   model.field().reserve(kTexelsAtATime);
   Array<float> features = device.array<float>(size_t{kFeatures} * kTexelsAtATime);
@@ -105,7 +104,8 @@ std::vector<float> TexelAtlas::findRanges(MeshModel& model) const {
       if (!isTexelUsed(pairs_[number / (patchEdge_ * patchEdge_)], within % patchEdge_, within / patchEdge_,
                        patchEdge_))
         continue;
-      if (1 / (1 + std::exp(-some[kFeatures * texel] - model.opacityOffset())) < kVisible) continue;
+      if (1 / (1 + std::exp(-some[kFeatures * texel] - model.opacityOffset())) < StoredOpacity::kTransparentBelow)
+        continue;
       for (size_t f = 0; f < kFeatures; ++f) {
         ranges[2 * f] = std::min(ranges[2 * f], some[kFeatures * texel + f]);
         ranges[2 * f + 1] = std::max(ranges[2 * f + 1], some[kFeatures * texel + f]);
