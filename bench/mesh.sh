@@ -4,7 +4,8 @@
 #                triangles in order of distance: a synthetic grid, and trained models if there are any (those that MODEL names,
 #                and those in build/bench/mesh); and how long Embree takes for a new hierarchy after a step has moved the vertices
 #   city         a city of 2x2 blocks, 15 minutes with coarse field and final stage: held-out PSNR of the baked scene and of its
-#                levels, beside `field` in the same time; bytes, triangles and time of baking; its contents as glTF files
+#                levels, beside `field` in the same time; bytes, triangles and time of baking; its contents as glTF files; the bytes
+#                of a block with stored and with inferred maps
 #   final        one block of the city with and without the final stage, in the same time, three seeds; the whole city likewise,
 #                once; what each step from its model to contents loses, and what opacities of 0 and 1 alone would
 #   holes        200 fresh views of that city from other heights: the share of pixels in which the scene's blocks have a hole, at the
@@ -106,6 +107,30 @@ valid() {
   verdict "$1, errors of glTF-Validator" "$errors" '<=' 0
 }
 
+# block_bytes SCENE: the bytes of the largest block of a city of 2x2 blocks: of all tiles in it, and of what they share.
+block_bytes() {
+  jq '.extensions.TESSERA_scene as $scene | ($scene.grid.columns / 2) as $edge |
+    [.root | recurse(.children[]?) | .extensions.TESSERA_scene.cells as $cells | (.contents // [.content // empty])[] |
+      .extensions.TESSERA_scene | select(.background_block | not) | {cells: $cells, bytes, resources}] as $contents |
+    [range(2) as $j | range(2) as $i | [$contents[] |
+      select(.cells[0] >= $i * $edge and .cells[2] <= ($i + 1) * $edge and
+             .cells[1] >= $j * $edge and .cells[3] <= ($j + 1) * $edge)] |
+      ([.[].bytes] | add) + ([.[].resources // [] | .[]] | unique | map($scene.resources[.].bytes) | add // 0)] | max' \
+    "$work/$1/tileset.json"
+}
+
+# maps MODEL CAPTURE: what a block takes on disk with stored and with inferred maps, without ordinary meshes.
+maps() {
+  local kind
+  for kind in stored inferred; do
+    [ -e "$work/$1.$kind/tileset.json" ] ||
+      "$tessera" bake "$work/$1" "$work/$1.$kind" --capture "$work/$2" --fallback 0 --maps "$kind" > /dev/null
+    echo "$1, largest block, $kind maps: $(block_bytes "$1.$kind") bytes on disk"
+  done
+  valid "$1.inferred"
+  verdict "$1, bytes of the largest block with inferred maps" "$(block_bytes "$1.inferred")" '<=' 15000000
+}
+
 city() {
   need_tessera
   [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
@@ -114,6 +139,7 @@ city() {
   echo "city 2x2 after 15 min: field $(judged city-field city) dB, mesh $(judged city-mesh city) dB"
   scene city-mesh city
   valid city-mesh.scene
+  maps city-mesh city
   verdict "city 2x2, held-out PSNR of the scene in dB" "$(judged city-mesh.scene city 0)" '>=' 24
   verdict "city 2x2, field less the scene in dB" "$(shortfall "$(judged city-field city)" "$(judged city-mesh.scene city 0)")" '<=' 1.5
 }

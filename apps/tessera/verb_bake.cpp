@@ -30,6 +30,18 @@ CLI::Validator makeMultipleValidator(int64_t unit) {
       fmt::format("a multiple of {}", unit));
 }
 
+// Replaces a word by its number.
+CLI::Validator makeChoiceTransform(std::span<const std::string_view> choices) {
+  return CLI::Validator(
+      [choices](std::string& text) -> std::string {
+        const auto choice = std::find(choices.begin(), choices.end(), text);
+        if (choice == choices.end()) return fmt::format("{} is not one of {}", text, fmt::join(choices, ", "));
+        text = std::to_string(choice - choices.begin());
+        return "";
+      },
+      fmt::format("{{{}}}", fmt::join(choices, ",")));
+}
+
 // One flag for each parameter of any method's bake. Methods that have a parameter of the same name share its flag.
 class ParameterFlags {
  public:
@@ -70,6 +82,12 @@ class ParameterFlags {
     std::optional<int64_t>& given = given_[parameter.name];
     CLI::Option* option = verb.add_option(optionName(parameter), given,
                                           fmt::format("of {}: {}", methodsWith(parameter.name), parameter.help));
+    if (!parameter.choices.empty()) {
+      if (parameter.standard)
+        option->default_str(std::string(parameter.choices[static_cast<size_t>(*parameter.standard)]));
+      option->type_name("TEXT")->transform(makeChoiceTransform(parameter.choices));
+      return;
+    }
     if (parameter.standard) option->default_str(std::to_string(*parameter.standard));
     option->check(CLI::Range(parameter.minimum, parameter.maximum));
     if (parameter.divisibleBy > 1) option->check(makeMultipleValidator(parameter.divisibleBy));

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "apps/tessera/folder_kind.h"
 #include "apps/tessera/verbs.h"
@@ -73,6 +74,7 @@ ordered_json describeScene(const fs::path& folder) {
   };
   const ContentCodec& codec = requireCodec(folder, tileset);
   std::vector<Sizes> levels(tileset.levels), backgroundBlocks(tileset.levels);
+  std::set<uint32_t> resources;
   for (size_t tile = 0; tile < tileset.tiles.size(); ++tile) {
     for (const TileContent& content : tileset.tiles[tile].contents) {
       Sizes& sizes = content.backgroundBlock ? backgroundBlocks[content.level] : levels[tileset.tiles[tile].level];
@@ -80,7 +82,14 @@ ordered_json describeScene(const fs::path& folder) {
       const fs::path file = contentPath(folder, content.uri);
       sizes.onDisk += fs::file_size(file);
       sizes.inMemory += readDecodedBytes(file, codec);
+      resources.insert(content.resources.begin(), content.resources.end());
     }
+  }
+  Sizes shared;
+  for (const uint32_t number : resources) {
+    const fs::path file = contentPath(folder, tileset.resources[number].uri);
+    shared.onDisk += fs::file_size(file);
+    shared.inMemory += readResourceBytes(file, codec, tileset.resources[number]);
   }
   ordered_json info = {
       {"kind", "scene"},
@@ -96,6 +105,10 @@ ordered_json describeScene(const fs::path& folder) {
   };
   describe("level", levels);
   describe("background_block", backgroundBlocks);
+  if (!resources.empty()) {
+    info["shared_resources"] = {
+        {"files", resources.size()}, {"bytes_on_disk", shared.onDisk}, {"bytes_in_memory", shared.inMemory}};
+  }
   return info;
 }
 

@@ -92,10 +92,11 @@ class OpenedModel {
   virtual void cullUnseen([[maybe_unused]] const Capture& capture, [[maybe_unused]] const CullOptions& options) {}
 };
 
-// An integer parameter of a method's baker: a flag of `tessera bake`, for models of this method only.
+// A parameter of a method's baker, an integer or a word: a flag of `tessera bake`, for models of this method only.
 struct BakeParameter {
   std::string_view name;  // snake_case
   std::string_view help;
+  std::span<const std::string_view> choices = {};  // words that stand for 0, 1, …
   int64_t minimum = 0, maximum = 0, divisibleBy = 1;
   std::optional<int64_t> standard = std::nullopt;  // the default; nothing if `help` describes the default behaviour
 };

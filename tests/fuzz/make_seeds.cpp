@@ -151,5 +151,7 @@ int main(int count, char** arguments) {
     write("mesh_payload/whole" + std::to_string(parts), file);
     write("mesh_payload/cut" + std::to_string(parts), sized(std::string(glb->json)) + toText(glb->bytes));
   }
+  write("mesh_payload/inferred", encodeMesh(tiles_test::inferredMeshContent(1)));
+  write("mesh_encoder/whole", encodeMeshEncoder(tiles_test::randomMeshEncoder(1)));
   return 0;
 }

@@ -21,7 +21,9 @@ std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
   return std::make_unique<ModelWithRenderer<TrainedMesh, MeshRenderer>>(std::move(mesh), std::move(renderer));
 }
 
-constexpr std::string_view kTexels = "texels", kTilesPerBlock = "tiles_per_block", kFallback = "fallback";
+constexpr std::string_view kTexels = "texels", kTilesPerBlock = "tiles_per_block", kFallback = "fallback",
+                           kMaps = "maps";
+constexpr std::string_view kMapChoices[] = {"stored", "inferred"};
 constexpr BakeParameter kBakeParameters[] = {
     {.name = kTexels,
      .help = "texels along the edge of a patch of two triangles, 8 to 32; 0: as the model was trained with",
@@ -38,7 +40,13 @@ constexpr BakeParameter kBakeParameters[] = {
      .help = "1: with ordinary textured meshes, for programs that know only glTF; 0: without",
      .minimum = 0,
      .maximum = 1,
-     .standard = MeshSceneSettings().fallback ? 1 : 0}};
+     .standard = MeshSceneSettings().fallback ? 1 : 0},
+    {.name = kMaps,
+     .help = "stored: textures in the tiles; inferred: instead of them, the encoder of each block, from which viewers "
+             "compute the same textures",
+     .choices = kMapChoices,
+     .maximum = 1,
+     .standard = MeshSceneSettings().inferredMaps ? 1 : 0}};
 
 std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const BakeParameters& parameters) {
   const auto value = [&](std::string_view name) { return static_cast<uint32_t>(parameters.at(std::string(name))); };
@@ -46,6 +54,7 @@ std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const B
   settings.patchEdge = value(kTexels);
   settings.tilesPerBlock = value(kTilesPerBlock);
   settings.fallback = value(kFallback) != 0;
+  settings.inferredMaps = value(kMaps) == 1;
   if (settings.patchEdge > 0 && settings.patchEdge < PatchSet::kMinPatchEdge) {
     throw Error("--texels " + std::to_string(settings.patchEdge), "", "is less than a patch has", "use 8 or more");
   }

@@ -32,9 +32,7 @@ std::vector<DenseLayer> readDecoder(MeshModel& model) {
 }
 
 // What the field says about a texel.
-struct FieldTexel {
-  std::array<float, kMeshFeatures> features{};
-  float opacity = 0;
+struct FieldTexel : MeshTexel {
   std::array<float, 3> colour{};
 };
 
@@ -48,7 +46,7 @@ class TexelField {
         list_(list),
         patches_(patches),
         settings_(settings),
-        placesPerEdge_(std::min(1u << level, kMaxPlacesPerEdge)) {
+        placesPerEdge_(placesPerEdge(level)) {
     Device& device = model.device();
     model.field().reserve(kPlacesAtATime);
     positions_ = device.array<float>(size_t{3} * kPlacesAtATime);
@@ -116,13 +114,11 @@ class TexelField {
 
   FieldTexel mean(const std::vector<float>& features, const std::vector<float>& colours, uint32_t first,
                   uint32_t places) const {
-    FieldTexel texel;
+    FieldTexel texel{averagePlaces(std::span(features).subspan(kMeshFeatures * first, kMeshFeatures * places),
+                                   model_.opacityOffset())};
     const float share = 1.0f / static_cast<float>(places);
-    for (size_t place = first; place < first + size_t{places}; ++place) {
-      for (size_t f = 0; f < kMeshFeatures; ++f) texel.features[f] += share * features[kMeshFeatures * place + f];
-      texel.opacity += share / (1 + std::exp(-features[kMeshFeatures * place] - model_.opacityOffset()));
+    for (size_t place = first; place < first + size_t{places}; ++place)
       for (size_t c = 0; c < 3 && !colours.empty(); ++c) texel.colour[c] += share * colours[3 * place + c];
-    }
     if (texel.opacity >= settings_.opaqueFrom) texel.opacity = 1;
     if (texel.opacity < settings_.transparentBelow) texel.opacity = 0;
     return texel;
@@ -140,6 +136,10 @@ class TexelField {
 };
 
 }  // namespace
+
+uint32_t placesPerEdge(uint32_t level) {
+  return std::min(1u << level, kMaxPlacesPerEdge);
+}
 
 BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces, const MeshBakeSettings& settings) {
   const OctahedraDomain& domain = model.level(level).domain();
@@ -175,6 +175,7 @@ BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces,
     });
   for (auto& range : baked.ranges)
     if (!(range.low <= range.high)) range = {0, 0};
+  if (!settings.texels) return baked;
   const size_t texels = patches.size() * settings.patchEdge * settings.patchEdge;
   baked.texels.reserve(texels * BakedPatches::kNumbers);
   field.forEachTexel(settings.baseColours, [&](size_t, const FieldTexel& texel) {

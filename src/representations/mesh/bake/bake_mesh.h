@@ -10,10 +10,14 @@ struct MeshBakeSettings {
   uint32_t patchEdge = 8;  // texels along the edge of a patch
   float opaqueFrom = StoredOpacity::kOpaqueFrom, transparentBelow = StoredOpacity::kTransparentBelow;
   bool baseColours = false;  // for an ordinary mesh: colours as the training photos see them on average
+  bool texels = true;        // may be false without baseColours: no texels, but their ranges
 };
 
-// Bakes the given faces of a level. A texel of a coarse level is the mean of the encoder's output at several places in
-// it, because single places alias.
+// The number of places along an edge of a texel of a level. A texel of a coarse level is the mean of the encoder's
+// output at several places in it, because single places alias.
+uint32_t placesPerEdge(uint32_t level);
+
+// Bakes the given faces of a level.
 BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces, const MeshBakeSettings& settings);
 
 }  // namespace tessera

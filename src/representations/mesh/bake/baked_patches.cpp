@@ -83,14 +83,12 @@ void passThroughBc4(BakedPatches& patches, Bc4Effort effort) {
   }
 }
 
-PatchSet compressPatches(const BakedPatches& patches, std::span<const uint32_t> numbers,
-                         const SceneFromPart& sceneFromPart, Bc4Effort effort) {
-  constexpr uint32_t kNumbers = BakedPatches::kNumbers;
-  const uint32_t edge = patches.patchEdge;
+PatchSet arrangePatches(const BakedPatches& patches, std::span<const uint32_t> numbers,
+                        const SceneFromPart& sceneFromPart) {
   PatchSet set;
-  set.patchEdge = edge;
+  set.patchEdge = patches.patchEdge;
   set.patches = static_cast<uint32_t>(numbers.size());
-  CHECK(set.patches <= maxPatches(edge));
+  CHECK(set.patches <= maxPatches(set.patchEdge));
   set.ranges = patches.ranges;
   set.decoder = patches.decoder;
   std::vector<Vec3d> corners;
@@ -101,27 +99,16 @@ PatchSet compressPatches(const BakedPatches& patches, std::span<const uint32_t> 
     for (uint32_t c = 0; c < 4; ++c) corners.push_back(sceneFromPart * patches.corner(number, c < 3 || isPair ? c : 0));
   }
   quantiseVertices(corners, set);
-  for (auto& blocks : set.featureBlocks) blocks.resize(set.textureBlocks() * PatchSet::kBc5Bytes);
-  set.opacityBlocks.resize(set.textureBlocks() * PatchSet::kBc4Bytes);
-  const uint32_t across = set.patchesAcross(), blocksAcross = set.textureWidth() / 4;
+  return set;
+}
+
+PatchSet compressPatches(const BakedPatches& patches, std::span<const uint32_t> numbers,
+                         const SceneFromPart& sceneFromPart, Bc4Effort effort) {
+  PatchSet set = arrangePatches(patches, numbers, sceneFromPart);
+  allocateTextures(set);
   for (uint32_t patch = 0; patch < set.patches; ++patch) {
-    const uint8_t* const texels = patches.texels.data() + size_t{kNumbers} * edge * edge * numbers[patch];
-    for (uint32_t y = 0; y < edge; y += 4) {
-      for (uint32_t x = 0; x < edge; x += 4) {
-        const size_t block = (patch % across * edge + x) / 4 + size_t{blocksAcross} * ((patch / across * edge + y) / 4);
-        for (uint32_t number = 0; number < kNumbers; ++number) {
-          Bc4Texels values{};
-          for (uint32_t i = 0; i < values.size(); ++i)
-            values[i] = texels[size_t{kNumbers} * (x + i % 4 + edge * (y + i / 4)) + number];
-          const Bc4Block encoded = encodeBc4(values, effort);
-          uint8_t* const to = number < kMeshFeatures
-                                  ? set.featureBlocks[number / 2].data() + PatchSet::kBc5Bytes * block +
-                                        PatchSet::kBc4Bytes * (number % 2)
-                                  : set.opacityBlocks.data() + PatchSet::kBc4Bytes * block;
-          std::copy(encoded.begin(), encoded.end(), to);
-        }
-      }
-    }
+    const size_t first = size_t{BakedPatches::kNumbers} * set.patchEdge * set.patchEdge * numbers[patch];
+    compressPatch(set, patch, patches.texels.data() + first, effort);
   }
   return set;
 }

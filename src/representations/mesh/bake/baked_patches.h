@@ -8,19 +8,19 @@
 #include <vector>
 
 #include "base/image.h"
-#include "representations/mesh/content/mesh_content.h"
-#include "tiles/bc4.h"
+#include "representations/mesh/content/patch_texels.h"
 
 namespace tessera {
 
 // The layout of patches is that of PatchSet, the pairs first.
 struct BakedPatches {
-  static constexpr uint32_t kNumbers = kMeshFeatures + 1;  // of a texel: the features, and the opacity
+  static constexpr uint32_t kNumbers = kTexelNumbers;
 
   uint32_t patchEdge = 8;  // T
   uint32_t pairs = 0;
   std::vector<double> vertices;                    // [patches][4][3], units of the part
-  std::vector<uint8_t> texels;                     // [patches][T][T][kNumbers], rows first; opacity / 255 last
+  std::vector<uint8_t> texels;                     // [patches][T][T][kNumbers], rows first; opacity / 255 last. May be
+                                                   // empty
   std::vector<uint8_t> baseColours;                // [patches][T][T][3], without dependence on the view; may be empty
   std::array<FeatureRange, kMeshFeatures> ranges;  // of the features
   std::vector<DenseLayer> decoder;
@@ -46,9 +46,12 @@ struct SceneFromPart {
   Vec3d operator*(const Vec3d& x) const { return scale * x + translation; }
 };
 
-// Compresses the patches with the given numbers, in this order; pairs must come first. Vertices are rounded to a
-// lattice whose step is a power of two, so that sets with equal steps agree where they meet. CHECKs that there are at
-// most maxPatches().
+// Arranges the patches with the given numbers, in this order, as a part without textures; pairs must come first.
+// Vertices are rounded to a lattice whose step is a power of two, so that sets with equal steps agree where they meet.
+// CHECKs that there are at most maxPatches().
+PatchSet arrangePatches(const BakedPatches& patches, std::span<const uint32_t> numbers,
+                        const SceneFromPart& sceneFromPart);
+// Likewise, with the texels of the patches.
 PatchSet compressPatches(const BakedPatches& patches, std::span<const uint32_t> numbers,
                          const SceneFromPart& sceneFromPart, Bc4Effort effort);
 // Returns the base colours and opacities of the same patches in the layout of the textures of the set: four channels.

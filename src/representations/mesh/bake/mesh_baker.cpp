@@ -13,6 +13,7 @@
 #include "base/error.h"
 #include "base/image_io.h"
 #include "representations/mesh/content/fallback_mesh.h"
+#include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/content/mesh_payload.h"
 
 namespace tessera {
@@ -25,7 +26,9 @@ constexpr int kExhaustiveFromEffort = 7;
 // A content under way: the parts that have been added, and the textures of its ordinary mesh.
 struct GrowingContent {
   MeshContent content;
-  std::vector<ImageU8> textures;  // of each part; empty without an ordinary mesh
+  std::vector<ImageU8> textures;    // of each part; empty without an ordinary mesh
+  std::vector<uint32_t> resources;  // of content.encoders
+  bool infersMaps = false;
   SceneBox box{Vec3d::Constant(INFINITY), Vec3d::Constant(-INFINITY)};
   uint32_t blocksToCome = 0;
 
@@ -36,6 +39,13 @@ struct GrowingContent {
         box.high = box.high.cwiseMax(part.corner(patch, number));
       }
   }
+};
+
+// The encoder of a block, which gives the texels of its contents.
+struct BlockEncoder {
+  std::shared_ptr<const SharedEncoder> shared;
+  PatchEncoder placement;
+  uint32_t resource = 0;  // with inferred maps
 };
 
 class MeshBaker final : public Baker {
@@ -100,7 +110,10 @@ class MeshBaker final : public Baker {
       const auto blocksAlong = [&](int axis) {
         return (cells.end[axis] + tilesPerBlock_ - 1) / tilesPerBlock_ - cells.first[axis] / tilesPerBlock_;
       };
-      growing[static_cast<uint32_t>(group)].blocksToCome = blocksAlong(0) * blocksAlong(1);
+      GrowingContent& content = growing[static_cast<uint32_t>(group)];
+      content.blocksToCome = blocksAlong(0) * blocksAlong(1);
+      // The textures of several blocks are smaller than their encoders, because their level is coarse.
+      content.infersMaps = settings_.inferredMaps && content.blocksToCome == 1;
     }
     for (int block = 0; block < mesh_.grid.cells(); ++block) {
       std::map<uint32_t, std::vector<uint32_t>> patchesOfGroup;
@@ -115,7 +128,8 @@ class MeshBaker final : public Baker {
           const Vec3d at = sceneFromPart(model) * baked.centre(patch);
           patchesOfGroup[groupAt(groups, block, at)].push_back(patch);
         }
-        for (auto& [group, patches] : patchesOfGroup) addPatches(baked, patches, sceneFromPart(model), growing[group]);
+        const BlockEncoder encoder = makeBlockEncoder(model, level);
+        for (auto& [group, patches] : patchesOfGroup) addPatches(baked, patches, model, &encoder, growing[group]);
       }
       for (const uint32_t group : groupsOfBlock) {
         if (--growing[group].blocksToCome > 0) continue;
@@ -139,7 +153,7 @@ class MeshBaker final : public Baker {
       for (int axis = 0; axis < 3; ++axis) x[axis] /= model.part().halfEdges[axis];
       byDistance[static_cast<int>(std::floor(std::log2(std::max(1.0, x.cwiseAbs().maxCoeff()))))].push_back(patch);
     }
-    for (const auto& [octave, patches] : byDistance) addPatches(baked, patches, sceneFromPart(model), growing);
+    for (const auto& [octave, patches] : byDistance) addPatches(baked, patches, model, nullptr, growing);
     finish(0, std::nullopt, growing);
   }
 
@@ -155,6 +169,7 @@ class MeshBaker final : public Baker {
     MeshBakeSettings settings;
     settings.patchEdge = settings_.patchEdge;
     settings.baseColours = settings_.fallback;
+    settings.texels = settings_.fallback || model.part().isBackground();  // else inferMaps() makes them
     if (!isExtracted(model, sceneLevel)) {
       return bakePatches(model, 0, model.atlas()->faces, settings);
     }
@@ -198,16 +213,67 @@ class MeshBaker final : public Baker {
                        tile(xInScene.y(), grid_.rows, block / columns * tiles));
   }
 
-  // Adds the patches as one part, or several if they do not fit one.
-  void addPatches(const BakedPatches& baked, const std::vector<uint32_t>& patches, const SceneFromPart& placement,
-                  GrowingContent& to) const {
+  BlockEncoder makeBlockEncoder(MeshModel& model, uint32_t sceneLevel) const {
+    const MeshConfig& config = model.config();
+    MeshEncoder encoder;
+    encoder.grid = {config.gridLevels, config.gridFeatures, config.gridLog2Size, config.gridBase, config.gridFinest};
+    encoder.width = static_cast<uint32_t>(config.width);
+    encoder.hiddenLayers = static_cast<uint32_t>(config.hidden);
+    encoder.opacityOffset = model.opacityOffset();
+    const auto [table, weights] =
+        model.device().readAll(model.field().table().values.all(), model.field().encoder().values.all());
+    encoder.table.resize(table.size());
+    std::transform(table.begin(), table.end(), encoder.table.begin(), toHalf);
+    forEachWeight(encoder.shape(),
+                  [&, &all = weights](size_t, size_t index) { encoder.weights.push_back(toHalf(all[index])); });
+    PatchEncoder placement;
+    const uint32_t level = findModelLevel(model, sceneLevel);
+    const OctahedraGrid& grid = model.level(level).domain().grids[0];
+    const SceneFromPart place = sceneFromPart(model);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double scale = double{grid.positionScale()};
+      placement.scale[axis] = scale * grid.gridFromScene[5 * axis] / place.scale;
+      placement.offset[axis] = scale * (double{grid.gridFromScene[4 * axis + 3]} + grid.positionOffset[axis]) -
+                               placement.scale[axis] * place.translation[static_cast<int>(axis)];
+    }
+    placement.places = placesPerEdge(level);
+    placement.opaqueFrom = MeshBakeSettings().opaqueFrom;
+    placement.transparentBelow = MeshBakeSettings().transparentBelow;
+    uint32_t resource = 0;
+    if (settings_.inferredMaps) {
+      const int block = model.part().block, columns = mesh_.grid.columns;
+      resource = sink_->addResource(fmt::format("encoder_{}_{}", block % columns, block / columns), kEncoderMimeType,
+                                    encodeMeshEncoder(encoder));
+    }
+    return {std::make_shared<SharedEncoder>(std::move(encoder)), placement, resource};
+  }
+
+  // Adds the patches as one part, or several if they do not fit one. `encoder`: of a block.
+  void addPatches(const BakedPatches& baked, const std::vector<uint32_t>& patches, const MeshModel& model,
+                  const BlockEncoder* encoder, GrowingContent& to) const {
     const Bc4Effort effort = options_.effort >= kExhaustiveFromEffort ? Bc4Effort::exhaustive : Bc4Effort::fast;
     const size_t most = maxPatches(baked.patchEdge);
     for (size_t first = 0; first < patches.size(); first += most) {
       const auto some = std::span(patches).subspan(first, std::min(most, patches.size() - first));
-      const PatchSet& part = to.content.parts.emplace_back(compressPatches(baked, some, placement, effort));
+      const SceneFromPart placement = sceneFromPart(model);
+      PatchSet& part = to.content.parts.emplace_back(encoder ? arrangePatches(baked, some, placement)
+                                                             : compressPatches(baked, some, placement, effort));
+      if (encoder) setMaps(*encoder, effort, to);
       to.include(part);
       if (settings_.fallback) to.textures.push_back(makeBaseColourTexture(baked, some, part));
+    }
+  }
+
+  // Sets the maps of the content's last part, or its encoder.
+  void setMaps(const BlockEncoder& encoder, Bc4Effort effort, GrowingContent& to) const {
+    PatchSet& part = to.content.parts.back();
+    part.encoder = encoder.placement;
+    if (to.infersMaps) {
+      to.content.encoders = {encoder.shared};
+      to.resources = {encoder.resource};
+    } else {
+      inferMaps(part, encoder.shared->encoder, *mesh_.device, effort);
+      part.encoder.reset();
     }
   }
 
@@ -244,7 +310,7 @@ class MeshBaker final : public Baker {
       fallback.add(content.parts[i], "../../" + sink_->resourceUri(resource));
     }
     summary.counts = {{"triangles", content.triangles()}, {"patches", patches}, {"fallback_bytes", textureBytes}};
-    sink_->add(level, cells, encodeMesh(content, std::move(file), fallback.scene()), summary);
+    sink_->add(level, cells, encodeMesh(content, std::move(file), fallback.scene()), summary, growing.resources);
   }
 
   static std::string textureName(uint32_t level, const std::optional<CellRange>& cells, size_t part) {

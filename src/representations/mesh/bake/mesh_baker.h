@@ -16,6 +16,7 @@ struct MeshSceneSettings {
   uint32_t tilesPerBlock = 0;  // along an edge, at the finest level: a power of two; 0: one for each 32 cells,
                                // rounded down to a power of two
   bool fallback = true;        // every content has an ordinary mesh for other programs
+  bool inferredMaps = false;   // contents of blocks have their block's encoder instead of textures, which it gives
 };
 
 std::unique_ptr<Baker> makeMeshBaker(TrainedMesh mesh, const MeshSceneSettings& settings);

@@ -6,15 +6,18 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "base/error.h"
 #include "base/image_io.h"
 #include "render/cpu/scene_renderer.h"
 #include "render/tile_scene.h"
+#include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/content/mesh_payload.h"
 #include "representations/mesh/cpu/mesh_drawer.h"
 #include "representations/mesh/testing/small_mesh.h"
 #include "representations/mesh/train/mesh_renderer.h"
 #include "representations/mesh/train/train_mesh.h"
 #include "tiles/glb.h"
+#include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
 #include "train/testing/cube_scene.h"
 
@@ -128,6 +131,71 @@ TEST_F(BakeMeshScene, ContainsOrdinaryMeshesWithTexturesThatExist) {
   EXPECT_EQ(textures.size(), baked.tileset.resources.size());
   bake("without", {.fallback = false});
   EXPECT_FALSE(fs::exists(*cube_ / "without" / "resources"));
+}
+
+TEST_F(BakeMeshScene, InfersTheTexturesThatItWouldStore) {
+  const BakedScene stored = bake("stored", {.tilesPerBlock = 2, .fallback = false}),
+                   inferred = bake("inferred", {.tilesPerBlock = 2, .fallback = false, .inferredMaps = true});
+  ASSERT_EQ(inferred.tileset.resources.size(), 2u) << "one encoder of each block";
+  ASSERT_EQ(inferred.tileset.tiles.size(), stored.tileset.tiles.size());
+  const auto read = [&](const std::string& scene, const Tileset& tileset, const TileContent& content) {
+    Resources resources;
+    for (const uint32_t number : content.resources) {
+      const SharedResource& resource = tileset.resources[number];
+      resources.push_back(readResource(contentPath(*cube_ / scene, resource.uri), meshCodec(), resource));
+    }
+    return readContent(contentPath(*cube_ / scene, content.uri), meshCodec(), resources);
+  };
+  size_t parts = 0;
+  for (size_t tile = 0; tile < stored.tileset.tiles.size(); ++tile) {
+    const auto &contents = stored.tileset.tiles[tile].contents, &others = inferred.tileset.tiles[tile].contents;
+    ASSERT_EQ(contents.size(), others.size());
+    for (size_t i = 0; i < contents.size(); ++i) {
+      const auto one = read("stored", stored.tileset, contents[i]),
+                 other = read("inferred", inferred.tileset, others[i]);
+      EXPECT_EQ(one->memoryBytes(), other->memoryBytes());
+      const MeshContent& content = contentAs<MeshContent>(*one);
+      MeshContent mesh = contentAs<MeshContent>(*other);
+      ASSERT_EQ(content.parts.size(), mesh.parts.size());
+      for (size_t number = 0; number < mesh.parts.size(); ++number) {
+        PatchSet& part = mesh.parts[number];
+        EXPECT_FALSE(content.parts[number].encoder);
+        if (part.encoder) {
+          inferMaps(part, mesh.encoders[part.encoder->resource]->encoder, *makeDevice({"cpu", 1}));
+          ++parts;
+        }
+        EXPECT_EQ(part.featureBlocks, content.parts[number].featureBlocks) << contents[i].uri;
+        EXPECT_EQ(part.opacityBlocks, content.parts[number].opacityBlocks) << contents[i].uri;
+      }
+    }
+  }
+  EXPECT_GE(parts, 8u) << "the tiles of the finest level";
+  for (const int level : {0, 1}) {
+    const auto one = open("stored", level), other = open("inferred", level);
+    for (const int index : cube_->capture().photosIn(Split::test)) {
+      const Photo& photo = cube_->capture().photos[index];
+      const Camera& camera = cube_->capture().cameras[photo.camera];
+      const RenderedView a = one->render(camera, photo.worldFromCamera, nullptr),
+                         b = other->render(camera, photo.worldFromCamera, nullptr);
+      EXPECT_EQ(a.colour.pixels, b.colour.pixels);
+      EXPECT_EQ(a.opacity.pixels, b.opacity.pixels);
+      EXPECT_EQ(a.depth.pixels, b.depth.pixels);
+    }
+  }
+}
+
+TEST_F(BakeMeshScene, IsNotDrawnWithoutItsEncoders) {
+  const BakedScene baked = bake("without_encoders", {.fallback = false, .inferredMaps = true});
+  const fs::path encoder = contentPath(*cube_ / "without_encoders", baked.tileset.resources[0].uri);
+  const Photo& photo = cube_->capture().photos[0];
+  const auto draw = [&] {
+    open("without_encoders")->render(cube_->capture().cameras[photo.camera], photo.worldFromCamera, nullptr);
+  };
+  draw();
+  writeFileAtomically(encoder, Bytes(100));
+  EXPECT_THROW(draw(), Error);
+  fs::remove(encoder);
+  EXPECT_THROW(draw(), Error);
 }
 
 }  // namespace

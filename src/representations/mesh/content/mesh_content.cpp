@@ -48,7 +48,8 @@ Footprint makeFootprint(const PatchSet& set, uint32_t patch, float column, float
 
 uint8_t FeatureRange::encode(float value) const {
   if (!(high > low)) return 0;
-  return static_cast<uint8_t>(std::clamp((value - low) / (high - low) * 255 + 0.5f, 0.0f, 255.0f));
+  // std::max returns 0 for what is not a number.
+  return static_cast<uint8_t>(std::min(std::max(0.0f, (value - low) / (high - low) * 255 + 0.5f), 255.0f));
 }
 
 uint32_t PatchSet::patchesAcross() const {

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,7 +15,8 @@
 
 namespace tessera {
 
-struct TileContent;  // tiles/tileset.h
+struct SharedEncoder;  // representations/mesh/content/mesh_encoder.h
+struct TileContent;    // tiles/tileset.h
 
 inline constexpr const char* kMeshName = "mesh";  // the name of the representation in files
 
@@ -34,6 +36,16 @@ struct FeatureRange {
 struct MeshTexel {
   std::array<float, kMeshFeatures> features{};
   float opacity = 0;
+};
+
+// Which encoder gives the texels of a part, and where it is evaluated.
+struct PatchEncoder {
+  uint32_t resource = 0;                    // number among MeshContent::encoders
+  std::array<double, 3> scale{}, offset{};  // of the position in the encoder's unit cube: scale · x + offset, clamped
+  uint32_t places = 1;                      // along an edge of a texel, which is their mean: 1, 2 or 4
+  float opaqueFrom = 1, transparentBelow = 0;
+
+  bool operator==(const PatchEncoder&) const = default;
 };
 
 // The triangles of one block, or of a piece of it, and the network that they share. Patch p is a square of patchEdge²
@@ -56,6 +68,8 @@ struct PatchSet {
   // p / patchesAcross() of patches, and in column p % patchesAcross().
   std::array<std::vector<uint8_t>, kFeatureTextures> featureBlocks;
   std::vector<uint8_t> opacityBlocks;
+  // Of inferred maps: the textures are empty, or what inferMaps() has set, and are not written to files.
+  std::optional<PatchEncoder> encoder;
   std::vector<DenseLayer> decoder;  // features and harmonics → … → 3
 
   uint32_t triangles() const { return patches + pairs; }
@@ -79,6 +93,7 @@ struct MeshContent {
   uint32_t skyEdge = 0;      // R; 0: no sky
   std::vector<uint8_t> sky;  // [6][R][R][3], the texels of CubeMapForward
   std::vector<PatchSet> parts;
+  std::vector<std::shared_ptr<const SharedEncoder>> encoders = {};  // the resources of the content
 
   uint64_t triangles() const;
 };
@@ -89,7 +104,8 @@ std::array<float, 3> skyColour(const MeshContent& content, const Vec3d& directio
 // Returns the memory of a part in bytes, of which only the numbers of patches and texels and the sizes of the layers
 // are read. Outputs of layers count as rounded up to multiples of 8, as renderers round them.
 uint64_t patchSetBytes(const PatchSet& set);
-// Returns the bytes that a content takes in memory, as counted by the budgets of renderers.
+// Returns the bytes that a content takes in memory, as counted by the budgets of renderers: with its textures, even if
+// they are not inferred yet, and without the encoders, which contents share.
 uint64_t bytesInMemory(const MeshContent& content);
 
 // Implements Content::mismatchWith.

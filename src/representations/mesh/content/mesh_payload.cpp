@@ -36,6 +36,12 @@ Json writePatchSet(ContentFileWriter& file, const PatchSet& set) {
   json["network"] = writeNetwork(file, set.decoder);
   if (set.patches == 0) return json;
   json["vertices"] = writeBytes(file, std::as_bytes(std::span(set.vertices)));
+  if (set.encoder) {
+    json["encoder"] = {{"resource", set.encoder->resource},      {"scale", set.encoder->scale},
+                       {"offset", set.encoder->offset},          {"places", set.encoder->places},
+                       {"opaque_from", set.encoder->opaqueFrom}, {"transparent_below", set.encoder->transparentBelow}};
+    return json;
+  }
   for (const std::vector<uint8_t>& blocks : set.featureBlocks)
     json["features"].push_back(writeBytes(file, std::as_bytes(std::span(blocks))));
   json["opacity"] = writeBytes(file, std::as_bytes(std::span(set.opacityBlocks)));

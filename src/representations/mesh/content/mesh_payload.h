@@ -30,8 +30,9 @@ Bytes encodeMesh(const MeshContent& content, ContentFileWriter file, const GltfS
 
 // Decodes untrusted bytes. Returns nothing, with the reason in `reason`, if the file violates the format or would take
 // more memory than the limits allow, which is checked before it is allocated.
+// `resources`: those of the content, which must be encoders.
 std::optional<MeshContent> decodeMesh(std::span<const std::byte> file, std::string& reason,
-                                      const ContentLimits& limits = {});
+                                      const ContentLimits& limits = {}, const Resources& resources = {});
 // Returns the memory that the decoded content will take, from the JSON of its container alone.
 std::optional<uint64_t> decodedMeshBytes(std::string_view json, std::string& reason, const ContentLimits& limits = {});
 

@@ -19,6 +19,7 @@ namespace tessera {
 namespace {
 
 using nlohmann::json;
+using tiles_test::inferredMeshContent;
 using tiles_test::randomMeshContent;
 using tiles_test::randomMeshNetwork;
 
@@ -39,13 +40,16 @@ void expectSameMesh(const MeshContent& a, const MeshContent& b) {
     EXPECT_EQ(one.featureBlocks, other.featureBlocks);
     EXPECT_EQ(one.opacityBlocks, other.opacityBlocks);
     EXPECT_TRUE(one.decoder == other.decoder);
+    EXPECT_TRUE(one.encoder == other.encoder);
   }
 }
 
 void expectRoundTrip(const MeshContent& content) {
   std::string reason;
-  const auto again = decodeMesh(encodeMesh(content), reason);
+  const Resources resources(content.encoders.begin(), content.encoders.end());
+  const auto again = decodeMesh(encodeMesh(content), reason, {}, resources);
   ASSERT_TRUE(again) << reason;
+  EXPECT_EQ(again->encoders, content.encoders);
   EXPECT_EQ(reason, "");
   expectSameMesh(content, *again);
 }
@@ -83,6 +87,23 @@ TEST(MeshPayload, GivesBackAPartWithoutPatches) {
   expectRoundTrip(content);
   const json part = parsePayloadAsset(encodeMesh(content))["parts"][0];
   for (const char* key : {"vertices", "features", "opacity"}) EXPECT_FALSE(part.contains(key)) << key;
+}
+
+TEST(MeshPayload, GivesBackAnEncoderInsteadOfTextures) {
+  MeshContent content = inferredMeshContent(4);
+  expectRoundTrip(content);
+  for (const char* key : {"features", "opacity"})
+    EXPECT_FALSE(parsePayloadAsset(encodeMesh(content))["parts"][1].contains(key)) << key;
+  EXPECT_EQ(patchSetBytes(content.parts[1]), patchSetBytes(tiles_test::randomPatchSet(5))) << "the textures count";
+  content.encoders.push_back(content.encoders[0]);
+  content.parts[1].encoder->resource = 1;
+  expectRoundTrip(content);
+  // Textures that have been inferred are not written.
+  const Bytes file = encodeMesh(content);
+  const PatchSet stored = tiles_test::randomPatchSet(5);
+  content.parts[1].featureBlocks = stored.featureBlocks;
+  content.parts[1].opacityBlocks = stored.opacityBlocks;
+  EXPECT_EQ(encodeMesh(content), file);
 }
 
 TEST(MeshPayload, GivesBackOddNumbersExactly) {
@@ -193,6 +214,35 @@ TEST(MeshPayload, NamesTheRuleThatIsBroken) {
   names("part 1: the network does not end in a colour", [](MeshContent& c) { c.parts[1].decoder.pop_back(); });
   names("part 1: the network contains a number that is not finite",
         [&](MeshContent& c) { c.parts[1].decoder[1].biases[2] = nan; });
+}
+
+TEST(MeshPayload, NamesTheRuleThatAnEncoderBreaks) {
+  const auto names = [](const std::string& rule, const std::function<void(PatchSet&)>& spoil) {
+    MeshContent content = inferredMeshContent(2);
+    ASSERT_EQ(validationError(content), std::nullopt);
+    spoil(content.parts[1]);
+    EXPECT_EQ(validationError(content).value_or("none"), "part 1: " + rule);
+  };
+  names("its encoder is not among the resources of the content", [](PatchSet& part) { part.encoder->resource = 1; });
+  for (const double number : {1.1e12, -1.1e12, double{NAN}, double{INFINITY}}) {
+    names("the scale or offset of its encoder is out of bounds", [&](PatchSet& p) { p.encoder->scale[1] = number; });
+    names("the scale or offset of its encoder is out of bounds", [&](PatchSet& p) { p.encoder->offset[2] = number; });
+  }
+  for (const uint32_t places : {0u, 3u, 8u})
+    names("the places of its encoder are out of bounds", [&](PatchSet& part) { part.encoder->places = places; });
+  const std::string opacities = "the opacities of its encoder are out of bounds";
+  for (const float number : {-0.1f, 0.9f, NAN})
+    names(opacities, [&](PatchSet& part) { part.encoder->transparentBelow = number; });
+  for (const float number : {0.1f, 1.1f, NAN})
+    names(opacities, [&](PatchSet& part) { part.encoder->opaqueFrom = number; });
+  names("its opacity has the wrong size", [](PatchSet& part) { part.opacityBlocks.push_back(0); });
+  MeshContent content = inferredMeshContent(2);
+  content.isBackground = true;
+  EXPECT_EQ(validationError(content), "part 1: it has an encoder, but is of a background block");
+  content.isBackground = false;
+  content.parts[1].patches = content.parts[1].pairs = 0;
+  content.parts[1].vertices.clear();
+  EXPECT_EQ(validationError(content), "part 1: it has an encoder, but no patches");
 }
 
 TEST(MeshPayload, IsNotWhatTheTilesetDeclaresIfItIsElsewhereOrOfAnotherKind) {
@@ -409,6 +459,38 @@ TEST_F(MeshDecoder, RejectsMalformedBytesOfParts) {
   refuses(features, [](json& asset) { part(asset)["patch_edge"] = part(asset)["patch_edge"] == 8 ? 12 : 8; });
   refuses(opacity, [](json& asset) { part(asset).erase("opacity"); });
   refuses("part 1: its opacity is malformed", [](json& asset) { ours(asset)["parts"][1].erase("opacity"); });
+}
+
+class InferredMeshDecoder : public MeshDecoder {
+ protected:
+  Bytes file() const override { return encodeMesh(content_); }
+  bool isRead(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits) const override {
+    return decodeMesh(file, reason, limits, {content_.encoders[0]}).has_value();
+  }
+  static json& encoder(json& asset) { return ours(asset)["parts"][1]["encoder"]; }
+
+  const MeshContent content_ = inferredMeshContent(3);
+};
+
+TEST_F(InferredMeshDecoder, RejectsMalformedEncoders) {
+  const std::string malformed = "part 1: its encoder is malformed";
+  for (const char* key : {"resource", "scale", "offset", "places", "opaque_from", "transparent_below"}) {
+    refuses(malformed, [&](json& asset) { encoder(asset).erase(key); });
+    refuses(malformed, [&](json& asset) { encoder(asset)[key] = "1"; });
+  }
+  refuses(malformed, [](json& asset) { encoder(asset) = 3; });
+  refuses(malformed, [](json& asset) { encoder(asset)["resource"] = -1; });
+  refuses(malformed, [](json& asset) { encoder(asset)["scale"].erase(2); });
+  refuses("part 1: its encoder is not among the resources of the content",
+          [](json& asset) { encoder(asset)["resource"] = 1; });
+  refuses("part 1: the places of its encoder are out of bounds", [](json& asset) { encoder(asset)["places"] = 3; });
+  for (const char* key : {"features", "opacity"})
+    refuses("part 1: it has both an encoder and stored maps",
+            [&](json& asset) { ours(asset)["parts"][1][key] = part(asset)[key]; });
+  refuses("part 1: its features are malformed", [](json& asset) { ours(asset)["parts"][1].erase("encoder"); });
+  std::string reason;
+  EXPECT_FALSE(decodeMesh(file(), reason)) << "without resources";
+  EXPECT_EQ(reason, "part 1: its encoder is not among the resources of the content");
 }
 
 TEST_F(MeshDecoder, RejectsMalformedNetworks) {

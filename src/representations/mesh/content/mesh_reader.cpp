@@ -3,7 +3,9 @@
 
 #include <cstring>
 
+#include "base/check.h"
 #include "base/image.h"
+#include "representations/mesh/content/mesh_encoder.h"
 #include "representations/mesh/content/mesh_payload.h"
 #include "tiles/content_file.h"
 #include "tiles/json_fields.h"
@@ -21,7 +23,11 @@ class MeshReader {
       : file_(file), reason_(reason), limits_(limits) {}
 
   // Returns the content, or nothing after fail().
-  std::optional<MeshContent> read() {
+  std::optional<MeshContent> read(const Resources& resources) {
+    for (const auto& resource : resources) {
+      content_.encoders.push_back(std::dynamic_pointer_cast<const SharedEncoder>(resource));
+      CHECK(content_.encoders.back() != nullptr);
+    }
     if (!readHeaders() || !readSky()) return std::nullopt;
     for (size_t i = 0; i < content_.parts.size(); ++i)
       if (!readPart(i)) return std::nullopt;
@@ -91,7 +97,21 @@ class MeshReader {
       part.ranges[f] = {static_cast<float>((*ends)[0]), static_cast<float>((*ends)[1])};
     }
     if (!readLayers(getField(json, "network"), part.decoder, reason_)) return false;
+    if (const auto* encoder = getField(json, "encoder"); encoder && part.patches > 0) {
+      if (getField(json, "features") || getField(json, "opacity"))
+        return failPart(number, "it has both an encoder and stored maps");
+      if (!readEncoder(*encoder, part.encoder.emplace())) return failPart(number, "its encoder is malformed");
+    }
     bytes_ += patchSetBytes(part);
+    return true;
+  }
+
+  static bool readEncoder(const json& json, PatchEncoder& encoder) {
+    const auto resource = getUnsigned(json, "resource"), places = getUnsigned(json, "places");
+    const auto scale = getNumbers<3>(json, "scale"), offset = getNumbers<3>(json, "offset");
+    const auto opaque = getNumber(json, "opaque_from"), transparent = getNumber(json, "transparent_below");
+    if (!resource || !places || !scale || !offset || !opaque || !transparent) return false;
+    encoder = {*resource, *scale, *offset, *places, static_cast<float>(*opaque), static_cast<float>(*transparent)};
     return true;
   }
 
@@ -114,6 +134,7 @@ class MeshReader {
     part.vertices.resize(size_t{12} * part.patches);
     if (!readBlocks(getField(json, "vertices"), part.vertices.data(), 2 * part.vertices.size()))
       return failPart(number, "its vertices are malformed");
+    if (part.encoder) return true;
     const nlohmann::json* features = getArray(json, "features");
     if (!features || features->size() != part.featureBlocks.size())
       return failPart(number, "its features are malformed");
@@ -151,21 +172,29 @@ class MeshCodec final : public ContentCodec {
                                       const ContentLimits& limits) const override {
     return decodedMeshBytes(json, reason, limits);
   }
-  std::unique_ptr<Content> decode(std::span<const std::byte> glb, const Resources&, std::string& reason,
+  std::unique_ptr<Content> decode(std::span<const std::byte> glb, const Resources& resources, std::string& reason,
                                   const ContentLimits& limits) const override {
-    auto content = decodeMesh(glb, reason, limits);
+    auto content = decodeMesh(glb, reason, limits, resources);
     return content ? makeContent(std::move(*content)) : nullptr;
+  }
+  uint64_t resourceMemoryBytes(const SharedResource&, uint64_t fileBytes) const override {
+    return sizeof(SharedEncoder) + fileBytes;
+  }
+  std::shared_ptr<const Resource> decodeResource(std::span<const std::byte> file, const SharedResource&,
+                                                 std::string& reason, const ContentLimits& limits) const override {
+    auto encoder = decodeMeshEncoder(file, reason, limits);
+    return encoder ? std::make_shared<SharedEncoder>(std::move(*encoder)) : nullptr;
   }
 };
 
 }  // namespace
 
-std::optional<MeshContent> decodeMesh(std::span<const std::byte> file, std::string& reason,
-                                      const ContentLimits& limits) {
+std::optional<MeshContent> decodeMesh(std::span<const std::byte> file, std::string& reason, const ContentLimits& limits,
+                                      const Resources& resources) {
   reason.clear();
   const auto content = decodeContentFile(file, kMeshName, reason);
   if (!content) return std::nullopt;
-  return MeshReader(*content, reason, limits).read();
+  return MeshReader(*content, reason, limits).read(resources);
 }
 
 std::optional<uint64_t> decodedMeshBytes(std::string_view text, std::string& reason, const ContentLimits& limits) {

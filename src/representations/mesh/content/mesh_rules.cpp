@@ -14,9 +14,23 @@ namespace {
 using Broken = std::optional<std::string>;
 
 constexpr double kFarthestVertex = 1e7, kLargestStep = 152;  // scene units
+constexpr double kLargestPlacement = 1e12;                   // in an encoder's unit cube
 constexpr double kBoxTolerance = 1e-6;                       // of the larger of 1 and the box's coordinate
 
-Broken ruleOfPatchSet(const PatchSet& set) {
+Broken ruleOfEncoder(const PatchEncoder& encoder, const MeshContent& content) {
+  if (content.isBackground) return "it has an encoder, but is of a background block";
+  if (encoder.resource >= content.encoders.size()) return "its encoder is not among the resources of the content";
+  for (const auto& numbers : {encoder.scale, encoder.offset})
+    for (const double number : numbers)
+      if (!(std::abs(number) <= kLargestPlacement)) return "the scale or offset of its encoder is out of bounds";
+  if (encoder.places != 1 && encoder.places != 2 && encoder.places != 4)
+    return "the places of its encoder are out of bounds";
+  if (!(encoder.transparentBelow >= 0 && encoder.transparentBelow <= encoder.opaqueFrom && encoder.opaqueFrom <= 1))
+    return "the opacities of its encoder are out of bounds";
+  return std::nullopt;
+}
+
+Broken ruleOfPatchSet(const PatchSet& set, const MeshContent& content) {
   if (set.patchEdge < PatchSet::kMinPatchEdge || set.patchEdge > PatchSet::kMaxPatchEdge || set.patchEdge % 4 != 0)
     return "its patch_edge is out of bounds";
   if (set.patches > maxPatches(set.patchEdge) || set.pairs > set.patches)
@@ -29,8 +43,12 @@ Broken ruleOfPatchSet(const PatchSet& set) {
       return "a range is out of bounds";
   }
   if (set.vertices.size() != size_t{12} * set.patches) return "it has the wrong number of vertices";
+  if (set.encoder) {
+    if (set.patches == 0) return "it has an encoder, but no patches";
+    if (const Broken broken = ruleOfEncoder(*set.encoder, content)) return broken;
+  }
   const auto isSized = [&](const std::vector<uint8_t>& blocks, uint32_t bytes) {
-    return blocks.size() == set.textureBlocks() * bytes;
+    return (set.encoder && blocks.empty()) || blocks.size() == set.textureBlocks() * bytes;
   };
   for (const std::vector<uint8_t>& blocks : set.featureBlocks)
     if (!isSized(blocks, PatchSet::kBc5Bytes)) return "its features have the wrong size";
@@ -46,7 +64,7 @@ std::optional<std::string> validationError(const MeshContent& content) {
   if (content.sky.size() != size_t{18} * content.skyEdge * content.skyEdge) return "its sky has the wrong size";
   if (content.parts.empty()) return "there are no parts";
   for (size_t i = 0; i < content.parts.size(); ++i)
-    if (const Broken broken = ruleOfPatchSet(content.parts[i])) return fmt::format("part {}: {}", i, *broken);
+    if (const Broken broken = ruleOfPatchSet(content.parts[i], content)) return fmt::format("part {}: {}", i, *broken);
   return std::nullopt;
 }
 

@@ -2,9 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
 #include "base/check.h"
+#include "compute/cpu/device.h"
 #include "render/pixel_directions.h"
+#include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/cpu/mesh_tracer.h"
 
 namespace tessera {
@@ -73,6 +76,14 @@ class MeshDrawer final : public CpuDrawer {
   // to twice as much for them (mesh_drawer_test.cpp).
   uint64_t residentBytes(uint64_t decodedBytes) const override { return 3 * decodedBytes + (1 << 20); }
   std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
+    auto* decoded = dynamic_cast<ContentOf<MeshContent>*>(content.get());
+    CHECK(decoded != nullptr);
+    if (!decoded->value.encoders.empty()) {
+      const std::lock_guard lock(inferring_);
+      const std::unique_ptr<Device> device = makeCpuDevice();
+      for (PatchSet& part : decoded->value.parts)
+        if (part.encoder) inferMaps(part, decoded->value.encoders[part.encoder->resource]->encoder, *device);
+    }
     return std::make_unique<PreparedMesh>(std::move(content));
   }
 
@@ -186,6 +197,7 @@ class MeshDrawer final : public CpuDrawer {
   }
 
   PixelDirections directions_;
+  mutable std::mutex inferring_;  // it uses all cores
 };
 
 }  // namespace

@@ -1,4 +1,4 @@
-// For tests: small contents of random triangles and texels.
+// For tests: small contents of random triangles and texels, stored or inferred.
 #pragma once
 
 #include <algorithm>
@@ -6,6 +6,7 @@
 
 #include "base/random.h"
 #include "representations/mesh/content/mesh_content.h"
+#include "representations/mesh/content/mesh_encoder.h"
 #include "tiles/bc4.h"
 
 namespace tessera::tiles_test {
@@ -71,6 +72,47 @@ inline MeshContent randomMeshContent(uint64_t seed, uint32_t parts = 2, bool isB
     content.sky.resize(size_t{18} * content.skyEdge * content.skyEdge);
     for (size_t i = 0; i < content.sky.size(); ++i) content.sky[i] = static_cast<uint8_t>(random.below(i, 256));
   }
+  return content;
+}
+
+// Returns a random encoder with one dense and two hashed levels.
+inline MeshEncoder randomMeshEncoder(uint64_t seed) {
+  const RandomStream random(seed, 0x656e);
+  uint64_t next = 0;
+  MeshEncoder encoder;
+  encoder.grid = {3, 2, 7, 4, 23};
+  encoder.width = 16;
+  encoder.hiddenLayers = 2;
+  encoder.opacityOffset = -0.25f;
+  encoder.table.resize(HashGrid(encoder.grid).parameters());
+  encoder.weights.resize(countMultiplyAccumulates(encoder.shape()));
+  for (uint16_t& half : encoder.table) half = toHalf(4 * random.uniform(next++) - 2);
+  for (uint16_t& half : encoder.weights) half = toHalf(1.5f * random.uniform(next++) - 0.75f);
+  return encoder;
+}
+
+// Returns a part whose maps are inferred, with the numbers of randomPatchSet(seed). The triangles fill most of the unit
+// cube of the encoder.
+inline PatchSet inferredPatchSet(uint64_t seed, uint32_t places = 1) {
+  PatchSet set = randomPatchSet(seed);
+  PatchEncoder& encoder = set.encoder.emplace();
+  for (size_t axis = 0; axis < 3; ++axis) {
+    encoder.scale[axis] = 1.1 / (65535 * set.step);
+    encoder.offset[axis] = -0.05 - encoder.scale[axis] * set.origin[axis];
+  }
+  encoder.places = places;
+  encoder.opaqueFrom = 0.6f;
+  encoder.transparentBelow = 0.4f;
+  for (auto& blocks : set.featureBlocks) blocks.clear();
+  set.opacityBlocks.clear();
+  return set;
+}
+
+// Returns a content of two parts, of which one has an encoder.
+inline MeshContent inferredMeshContent(uint64_t seed) {
+  MeshContent content = randomMeshContent(seed, 1);
+  content.parts.push_back(inferredPatchSet(seed + 1, 2));
+  content.encoders = {std::make_shared<SharedEncoder>(randomMeshEncoder(seed))};
   return content;
 }
 

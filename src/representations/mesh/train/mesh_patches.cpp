@@ -130,12 +130,6 @@ std::vector<TrianglePatch> pairTriangles(const TriangleList& list) {
   return patches;
 }
 
-Vec3d texelPosition(const std::array<Vec3d, 4>& corners, bool isPair, double column, double row, uint32_t patchEdge) {
-  const double u = column / (patchEdge - 1), v = row / (patchEdge - 1);
-  if (u + v <= 1 || !isPair) return corners[0] + u * (corners[1] - corners[0]) + v * (corners[2] - corners[0]);
-  return corners[3] + (1 - u) * (corners[2] - corners[3]) + (1 - v) * (corners[1] - corners[3]);
-}
-
 void toFieldPosition(const OctahedraGrid& grid, const Vec3d& point, float* position) {
   double g[4];
   for (size_t row = 0; row < 4; ++row) {

@@ -36,10 +36,6 @@ struct TrianglePatch {
 // Pairs triangles that share an edge, the flattest pairs first. Returns the pairs, then single triangles.
 std::vector<TrianglePatch> pairTriangles(const TriangleList& list);
 
-// The position in the scene of a texel of a patch, which continues the first triangle's plane where there is no second
-// one. `column`, `row`: in units of texels, T - 1 at the last.
-Vec3d texelPosition(const std::array<Vec3d, 4>& corners, bool isPair, double column, double row, uint32_t patchEdge);
-
 // Whether a texel of a patch is mixed into a place of one of its triangles.
 inline bool isTexelUsed(bool isPair, uint32_t column, uint32_t row, uint32_t patchEdge) {
   return isPair || column + row <= patchEdge;

@@ -4,6 +4,8 @@
 
 #include <set>
 
+#include "representations/mesh/content/patch_texels.h"
+
 namespace tessera {
 namespace {
 

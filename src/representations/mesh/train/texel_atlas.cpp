@@ -8,6 +8,7 @@
 
 #include "base/error.h"
 #include "compute/patches.h"
+#include "representations/mesh/content/patch_texels.h"
 
 namespace tessera {
 namespace {
