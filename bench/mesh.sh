@@ -19,6 +19,13 @@
 #   processes    four blocks as four processes and one after another: equal bytes
 #   killed       killed at ten random moments, and baking at three: equal bytes
 #   vulkan       300 steps with `vulkan` against `cpu`: PSNR of the training photos
+#   fallback     the ordinary glTF meshes in the contents of that scene's finest level, in Blender, assimp and three.js: they load with
+#                the same numbers of triangles; and held-out views of three.js and Blender, without mipmaps and antialiasing, against
+#                the scene without view dependence (every hit has the base colour of its texels), the scene as it is, an
+#                implementation by Embree of what glTF says, and photos without distortion. Where no triangle covers a pixel, the
+#                scene's sky is put in. Needs blender, python3-numpy, assimp-utils and chromium of Debian
+#   yardstick    that scene against the city's true triangles with as many texels, coloured by the training photos: an ideal
+#                photogrammetric mesh
 #   fox, beach   real photographs, 10 minutes each: held-out PSNR of the baked scene
 # Resumable: everything is kept in build/bench/mesh, and what exists is not made again; remove traversal-* there to repeat a row.
 #   [ROWS="traversal city final …"] [SEEDS="1 2 3"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
@@ -357,6 +364,64 @@ holes() {
   done
 }
 
+# pictures: renders the views of the fallback in all programs, and compares them.
+pictures() {
+  local program=build/release/bench/mesh_fallback folder=$work/fallback scene=$work/city-mesh.scene needed uri
+  for needed in blender assimp "${TESSERA_CHROMIUM:-chromium}"; do
+    command -v "$needed" > /dev/null ||
+      die "$needed is missing: apt-get install --no-install-recommends blender python3-numpy assimp-utils chromium"
+  done
+  [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_fallback"
+  [ -d web/node_modules/three ] || tools/build-web.sh --packages-only
+  [ -e "$work/pinhole/transforms.json" ] || "$tessera" synth city "$work/pinhole" --blocks 2x2 --pinhole
+  "$program" views "$scene" "$work/pinhole" "$folder"
+  node bench/fallback_three.mjs "$scene" "$folder" > "$folder/three.json"
+  blender -b --python-exit-code 1 --python bench/fallback_blender.py -- "$scene" "$folder" > "$folder/blender.log" 2>&1 ||
+    die "$folder/blender.log: $(grep -i error "$folder/blender.log" | tail -n 1)"
+  for uri in $(jq -r '.contents[].uri' "$folder/views.json"); do
+    assimp info "$scene/$uri" | awk '/^Faces:/ { print $2 }'
+  done | jq -s . > "$folder/assimp.json"
+  "$program" compare "$scene" "$work/pinhole" "$folder" > "$folder/compared.part"
+  mv "$folder/compared.part" "$folder/compared.json"
+}
+
+fallback() {
+  need_tessera
+  local folder=$work/fallback name psnr
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  [ -s "$folder/compared.json" ] || pictures
+  for name in three blender assimp; do
+    verdict "$name, contents with another number of triangles" "$(jq --slurpfile loaded "$folder/$name.json" \
+      '[([.contents[].triangles], $loaded[0]) | to_entries[]] | group_by(.key) | map(select(.[0].value != .[1].value)) | length' \
+      "$folder/views.json")" '<=' 0
+  done
+  jq -r 'to_entries[] | select(.key != "views") | .key as $a | .value | to_entries[] |
+    "\($a) against \(.key): \(.value.psnr) dB, SSIM \(.value.ssim)"' "$folder/compared.json"
+  for name in three blender; do
+    psnr=$(jq --arg name "$name" '.[$name].plain.psnr * 100 | round / 100' "$folder/compared.json")
+    verdict "$name, PSNR against the scene without view dependence in dB" "$psnr" '>=' 25
+  done
+}
+
+yardstick() {
+  need_tessera
+  local program=build/release/bench/mesh_yardstick file=$work/yardstick.json
+  [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_yardstick"
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  if [ ! -s "$file" ]; then
+    "$program" "$work/city-mesh.scene" "$work/city" "$work/yardstick" > "$file.part"
+    mv "$file.part" "$file"
+  fi
+  jq -r '"\(.texels) texels, \(.texels_per_pixel) along a pixel", (("scene", "mean", "sharpest", "sharpest_9_rays") as $name |
+    .[$name] | "\($name): \(.psnr) dB, SSIM \(.ssim), of surfaces in the box \(.psnr_in_box) dB")' "$file"
+  verdict "city 2x2, the scene less an ideal photogrammetric mesh in dB" \
+    "$(shortfall "$(jq .scene.psnr "$file")" "$(jq .mean.psnr "$file")")" '>=' 0
+}
+
 # photos NAME DOWNSCALE BOUND ARGUMENTS...: the same for real photographs.
 photos() {
   need_tessera
@@ -372,5 +437,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city final holes losses quads depth borders processes killed vulkan fox beach}; do "$row"; done
+for row in ${ROWS:-traversal city final holes losses quads depth borders processes killed vulkan fallback yardstick fox beach}; do
+  "$row"
+done
 finish

@@ -35,7 +35,7 @@ size_t FallbackMesh::addMaterial(const std::string& textureUri) {
   material["pbrMetallicRoughness"]["baseColorTexture"]["index"] = scene_.textures.size() - 1;
   material["pbrMetallicRoughness"]["metallicFactor"] = 0;
   material["alphaMode"] = "MASK";
-  material["alphaCutoff"] = 0.5;
+  material["alphaCutoff"] = kFallbackAlphaCutoff;
   material["doubleSided"] = true;
   material["extensions"][kUnlit] = GltfScene::Json::object();
   scene_.materials.push_back(material);

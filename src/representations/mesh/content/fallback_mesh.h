@@ -12,6 +12,9 @@
 
 namespace tessera {
 
+// Opacities below it are cut out. The image is nearest to that of composited hits then (0.5 shows too little).
+inline constexpr float kFallbackAlphaCutoff = 0.4f;
+
 // Collects the parts of one content.
 class FallbackMesh {
  public:
