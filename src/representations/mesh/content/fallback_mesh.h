@@ -13,7 +13,7 @@
 namespace tessera {
 
 // Opacities below it are cut out. The image is nearest to that of composited hits then (0.5 shows too little).
-inline constexpr float kFallbackAlphaCutoff = 0.4f;
+inline constexpr double kFallbackAlphaCutoff = 0.4;
 
 // Collects the parts of one content.
 class FallbackMesh {

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "representations/mesh/content/patch_texels.h"
+#include "representations/mesh/train/face_set.h"
 
 namespace tessera {
 namespace {
