@@ -1,5 +1,6 @@
 # Sourced by the scripts of this folder, which run from the repository's root: paths and shared functions. TESSERA overrides the
 # binary; TESSERA_SHARED_DATA names the folder of photographs.
+shopt -s inherit_errexit  # in command substitutions, too
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 tessera=${TESSERA:-build/release/apps/tessera/tessera}
 out=build/bench
@@ -20,7 +21,13 @@ alone() {
 }
 
 # Compares numbers, not text: holds 27.3 '>=' 27.2
-holds() { awk -v a="$1" -v b="$3" -v how="$2" 'BEGIN { exit !(how == ">=" ? a >= b : a <= b) }'; }
+# What is not a number holds nowhere.
+holds() {
+  awk -v a="$1" -v b="$3" -v how="$2" 'BEGIN {
+    number = "^[-+]?[0-9]+[.]?[0-9]*([eE][-+]?[0-9]+)?$"
+    exit !(a ~ number && b ~ number && (how == ">=" ? a + 0 >= b + 0 : a + 0 <= b + 0))
+  }'
+}
 
 # verdict WHAT VALUE >=|<= BOUND: prints one line, and remembers a failure for `finish`.
 failures=0
@@ -58,7 +65,7 @@ trained() {
   local model=$work/$1 capture=$work/$2
   shift 2
   [ -e "$model.done" ] && return
-  "$tessera" train "$capture" "$model" --resume "$@"
+  "$tessera" train "$capture" "$model" --resume "$@" || return
   touch "$model.done"
 }
 # baked MODEL SCENE CAPTURE

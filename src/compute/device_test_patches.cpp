@@ -80,6 +80,8 @@ std::vector<float> texelRanges() {
 StoreTexelsForward storeOptions() {
   StoreTexelsForward a;
   a.offset = -0.5f;
+  a.opaqueFrom = 0.8f;
+  a.transparentBelow = 0.3f;
   return a;
 }
 

@@ -89,7 +89,7 @@ struct StoreTexelsForward {
 
   Count rows;
   float offset = 0;
-  float opaqueFrom = 0.8f, transparentBelow = 0.02f;
+  float opaqueFrom = 1, transparentBelow = 0;
   Matrix<const float> features;  // kFeatures columns
   Slice<const float> ranges;     // [kFeatures][2]: low, high
   Matrix<float> stored;          // kStored columns, overwritten: features, opacity

@@ -86,7 +86,7 @@ class TexelField {
       const uint32_t number = static_cast<uint32_t>(texel / (size_t{edge} * edge)),
                      within = static_cast<uint32_t>(texel % (size_t{edge} * edge)), place = i % perTexel;
       const TrianglePatch& patch = patches_[number];
-      const auto shifted = [&](uint32_t at, uint32_t part) { return at + (part + 0.5) / placesPerEdge_ - 0.5; };
+      const auto shifted = [&](uint32_t at, uint32_t part) { return placeInTexel(at, part, placesPerEdge_); };
       std::array<Vec3d, 4> corners;
       for (int corner = 0; corner < 4; ++corner) corners[corner] = list_.vertices[patch.corners[corner]];
       const Vec3d at = texelPosition(corners, patch.isPair, shifted(within % edge, place % placesPerEdge_),
@@ -119,8 +119,7 @@ class TexelField {
     const float share = 1.0f / static_cast<float>(places);
     for (size_t place = first; place < first + size_t{places}; ++place)
       for (size_t c = 0; c < 3 && !colours.empty(); ++c) texel.colour[c] += share * colours[3 * place + c];
-    if (texel.opacity >= settings_.opaqueFrom) texel.opacity = 1;
-    if (texel.opacity < settings_.transparentBelow) texel.opacity = 0;
+    texel.opacity = storedOpacity(texel.opacity, settings_.opaqueFrom, settings_.transparentBelow);
     return texel;
   }
 

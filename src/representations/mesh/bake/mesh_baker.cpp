@@ -44,6 +44,7 @@ struct GrowingContent {
 // The encoder of a block, which gives the texels of its contents.
 struct BlockEncoder {
   std::shared_ptr<const SharedEncoder> shared;
+  std::shared_ptr<MapInference> inference;
   PatchEncoder placement;
   uint32_t resource = 0;  // with inferred maps
 };
@@ -169,7 +170,7 @@ class MeshBaker final : public Baker {
     MeshBakeSettings settings;
     settings.patchEdge = settings_.patchEdge;
     settings.baseColours = settings_.fallback;
-    settings.texels = settings_.fallback || model.part().isBackground();  // else inferMaps() makes them
+    settings.texels = settings_.fallback || model.part().isBackground();  // else MapInference makes them
     if (!isExtracted(model, sceneLevel)) {
       return bakePatches(model, 0, model.atlas()->faces, settings);
     }
@@ -245,7 +246,8 @@ class MeshBaker final : public Baker {
       resource = sink_->addResource(fmt::format("encoder_{}_{}", block % columns, block / columns), kEncoderMimeType,
                                     encodeMeshEncoder(encoder));
     }
-    return {std::make_shared<SharedEncoder>(std::move(encoder)), placement, resource};
+    auto inference = std::make_shared<MapInference>(*mesh_.device, encoder);
+    return {std::make_shared<SharedEncoder>(std::move(encoder)), std::move(inference), placement, resource};
   }
 
   // Adds the patches as one part, or several if they do not fit one. `encoder`: of a block.
@@ -272,7 +274,7 @@ class MeshBaker final : public Baker {
       to.content.encoders = {encoder.shared};
       to.resources = {encoder.resource};
     } else {
-      inferMaps(part, encoder.shared->encoder, *mesh_.device, effort);
+      encoder.inference->infer(part, effort);
       part.encoder.reset();
     }
   }

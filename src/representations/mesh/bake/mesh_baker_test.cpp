@@ -161,7 +161,8 @@ TEST_F(BakeMeshScene, InfersTheTexturesThatItWouldStore) {
         PatchSet& part = mesh.parts[number];
         EXPECT_FALSE(content.parts[number].encoder);
         if (part.encoder) {
-          inferMaps(part, mesh.encoders[part.encoder->resource]->encoder, *makeDevice({"cpu", 1}));
+          const std::unique_ptr<Device> device = makeDevice({"cpu", 1});
+          MapInference(*device, mesh.encoders[part.encoder->resource]->encoder).infer(part);
           ++parts;
         }
         EXPECT_EQ(part.featureBlocks, content.parts[number].featureBlocks) << contents[i].uri;

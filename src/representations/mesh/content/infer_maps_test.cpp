@@ -88,7 +88,7 @@ TEST(InferMaps, GivesTheTexelsThatTheFormatDefines) {
   for (const uint32_t places : {1u, 2u, 4u}) {
     PatchSet set = inferredPatchSet(places, places);
     const MeshEncoder encoder = randomMeshEncoder(places);
-    inferMaps(set, encoder, *device);
+    MapInference(*device, encoder).infer(set);
     for (uint32_t patch = 0; patch < set.patches; ++patch) {
       const uint32_t left = patch % set.patchesAcross() * set.patchEdge,
                      top = patch / set.patchesAcross() * set.patchEdge;
@@ -137,8 +137,9 @@ TEST(InferMaps, GivesTheSameBytesWithAnyNumberOfThreads) {
   one.vertices.resize(size_t{12} * one.patches);
   for (size_t i = 0; i < one.vertices.size(); ++i) one.vertices[i] = static_cast<uint16_t>(i * 7919);
   other = one;
-  inferMaps(one, encoder, *makeDevice({"cpu", 1}));
-  inferMaps(other, encoder, *makeDevice({"cpu", 3}));
+  const std::unique_ptr<Device> single = makeDevice({"cpu", 1}), several = makeDevice({"cpu", 3});
+  MapInference(*single, encoder).infer(one);
+  MapInference(*several, encoder).infer(other);
   EXPECT_EQ(one.featureBlocks, other.featureBlocks);
   EXPECT_EQ(one.opacityBlocks, other.opacityBlocks);
 }
@@ -152,7 +153,8 @@ TEST(InferMaps, GivesBytesWhateverTheEncoderComputes) {
     encoder.weights.push_back(encoder.weights[encoder.weights.size() % 17]);
   ASSERT_EQ(validationError(encoder), std::nullopt);
   PatchSet set = inferredPatchSet(3);
-  inferMaps(set, encoder, *makeDevice({"cpu", 2}));
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 2});
+  MapInference(*device, encoder).infer(set);
   EXPECT_EQ(set.opacityBlocks.size(), 8 * set.textureBlocks());
 }
 

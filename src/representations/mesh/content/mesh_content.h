@@ -68,7 +68,7 @@ struct PatchSet {
   // p / patchesAcross() of patches, and in column p % patchesAcross().
   std::array<std::vector<uint8_t>, kFeatureTextures> featureBlocks;
   std::vector<uint8_t> opacityBlocks;
-  // Of inferred maps: the textures are empty, or what inferMaps() has set, and are not written to files.
+  // Of inferred maps: the textures are empty, or what MapInference has set, and are not written to files.
   std::optional<PatchEncoder> encoder;
   std::vector<DenseLayer> decoder;  // features and harmonics → … → 3
 

@@ -17,6 +17,15 @@ inline constexpr uint32_t kTexelNumbers = kMeshFeatures + 1;  // of a texel: the
 // one. `column`, `row`: in units of texels, T - 1 at the last.
 Vec3d texelPosition(const std::array<Vec3d, 4>& corners, bool isPair, double column, double row, uint32_t patchEdge);
 
+// The column, or row, of a place in a texel, of which there are `places` along its edge.
+inline double placeInTexel(uint32_t texel, uint32_t number, uint32_t places) {
+  return texel + (number + 0.5) / places - 0.5;
+}
+
+inline float storedOpacity(float opacity, float opaqueFrom, float transparentBelow) {
+  return opacity >= opaqueFrom ? 1 : opacity < transparentBelow ? 0 : opacity;
+}
+
 // Averages the output of an encoder, [places][kMeshFeatures], at the places of a texel; opacities after the sigmoid.
 MeshTexel averagePlaces(std::span<const float> features, float opacityOffset);
 

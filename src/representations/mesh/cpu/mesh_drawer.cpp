@@ -75,14 +75,20 @@ class MeshDrawer final : public CpuDrawer {
   // A patch has at least 312 bytes when decoded, and two triangles. With the copies of their corners, Embree takes up
   // to twice as much for them (mesh_drawer_test.cpp).
   uint64_t residentBytes(uint64_t decodedBytes) const override { return 3 * decodedBytes + (1 << 20); }
+  // While a content is prepared, its encoder is also in memory in float32.
+  uint64_t residentBytesOfResource(uint64_t decodedBytes) const override { return 3 * decodedBytes; }
   std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
     auto* decoded = dynamic_cast<ContentOf<MeshContent>*>(content.get());
     CHECK(decoded != nullptr);
     if (!decoded->value.encoders.empty()) {
       const std::lock_guard lock(inferring_);
       const std::unique_ptr<Device> device = makeCpuDevice();
-      for (PatchSet& part : decoded->value.parts)
-        if (part.encoder) inferMaps(part, decoded->value.encoders[part.encoder->resource]->encoder, *device);
+      MeshContent& mesh = decoded->value;
+      for (uint32_t resource = 0; resource < mesh.encoders.size(); ++resource) {
+        MapInference inference(*device, mesh.encoders[resource]->encoder);
+        for (PatchSet& part : mesh.parts)
+          if (part.encoder && part.encoder->resource == resource) inference.infer(part);
+      }
     }
     return std::make_unique<PreparedMesh>(std::move(content));
   }

@@ -42,7 +42,7 @@ double MeshStart::pixels() const {
   return sum;
 }
 
-SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse)
+SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool seesPoints)
     : frame_(coarse.frame()), space_(coarse.space()), photoCount_(capture.photos.size()) {
   FieldRenderer renderer(coarse);
   for (const int photo : capture.photosIn(Split::train)) {
@@ -72,7 +72,7 @@ SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse)
       }
     }
   }
-  addSurface(capture, renderer);
+  if (seesPoints) addSurface(capture, renderer);
   CullOptions options;
   options.stride = kPhotoStride;
   renderer.cullUnseen(capture, options);
@@ -107,7 +107,7 @@ void SurfaceSurvey::addSurface(const Capture& capture, FieldRenderer& renderer) 
   }
 }
 
-void SurfaceSurvey::findDisplacements(const OctahedraDomain& domain, const MeshPart& part, MeshStart& start) const {
+std::vector<float> SurfaceSurvey::findDisplacements(const MeshPart& part, const OctahedraDomain& domain) const {
   constexpr uint32_t kLeastPoints = 3;
   constexpr float kReach = 0.9f * kMaxDisplacement;
   const OctahedraGrid& grid = domain.grids[0];
@@ -124,11 +124,11 @@ void SurfaceSurvey::findDisplacements(const OctahedraDomain& domain, const MeshP
     }
     ++counts[*cell];
   }
-  start.displacements.assign(size_t{3} * grid.cells(), 0);
+  std::vector<float> displacements(size_t{3} * grid.cells());
   for (size_t cell = 0; cell < counts.size(); ++cell)
     for (int axis = 0; axis < 3 && counts[cell] >= kLeastPoints; ++axis)
-      start.displacements[3 * cell + axis] =
-          std::clamp(static_cast<float>(sums[cell][axis] / counts[cell]), -kReach, kReach);
+      displacements[3 * cell + axis] = std::clamp(static_cast<float>(sums[cell][axis] / counts[cell]), -kReach, kReach);
+  return displacements;
 }
 
 MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& domain) const {
@@ -166,7 +166,6 @@ MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& 
     }
   }
 
-  if (!part.isBackground()) findDisplacements(domain, part, start);
   // An occupancy has at least one cell; this one is for what shows the sky alone.
   if (part.isBackground() && std::find(start.cells.begin(), start.cells.end(), true) == start.cells.end())
     start.cells.front() = true;

@@ -13,8 +13,7 @@ class FieldRenderer;
 // Where the training of one part starts.
 struct MeshStart {
   std::vector<bool> cells;           // [cells of the lattice] of the finest level
-  std::vector<float> displacements;  // of a block's vertices, [cells][3] in edges of a cell: to the surface that photos
-                                     // see in the cell; empty: none
+  std::vector<float> displacements;  // SurfaceSurvey::findDisplacements; empty: vertices start in the middle of cells
   std::vector<TileShares> tiles;     // [photo]; only training photos have some
   double pixelWidth = 0;             // of a photo on the surfaces, the median, units of the part; 0: unknown
 
@@ -26,12 +25,16 @@ struct MeshStart {
 // What the training photos see of the coarse field, in the world.
 class SurfaceSurvey {
  public:
-  SurfaceSurvey(const Capture& capture, FieldModel& coarse);
+  // `seesPoints`: for findDisplacements, which takes as many rays again.
+  SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool seesPoints);
 
   // Finds the cells of `domain`, of the part's finest level, in which there may be a surface, and the tiles whose
   // middles show one in the block or up to half of its margin beside it; outside: the tiles that show the sky, or a
   // surface that is not in front of the region.
   MeshStart findStart(const MeshPart& part, const OctahedraDomain& domain) const;
+  // Returns the displacements of a block's vertices, [cells][3] in edges of a cell, to the mean of the points of
+  // surfaces that photos show in the cell; zero if there are fewer than three.
+  std::vector<float> findDisplacements(const MeshPart& part, const OctahedraDomain& domain) const;
 
  private:
   // A tile of a photo, and what its middle shows.
@@ -44,7 +47,6 @@ class SurfaceSurvey {
   };
 
   void addSurface(const Capture& capture, FieldRenderer& renderer);
-  void findDisplacements(const OctahedraDomain& domain, const MeshPart& part, MeshStart& start) const;
 
   SceneFrame frame_;  // of the coarse field
   MarchSpace space_;

@@ -57,7 +57,7 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
       photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config) {
   model_.level(0).exclude(start.cells);
-  if (config.surfaceStart && !start.displacements.empty())
+  if (!start.displacements.empty())
     device.write(model_.level(0).displacements().values.all(), std::span<const float>(start.displacements));
   tiles_ = start.tiles;
   pixelWidth_ = start.pixelWidth;

@@ -121,7 +121,15 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
     EXPECT_LE(most.contains(face), faces.contains(face)) << "rays were added";
   }
   model.level(0).keepFaces(faces.bits());
-  EXPECT_GT(heldOutPsnr(scene, model), before - 1.5);
+  const double withAll = heldOutPsnr(scene, model);
+  EXPECT_GT(withAll, before - 1.5);
+  ExtractionSettings economic = all;
+  economic.droppedShare = 0.01;
+  const FaceSet fewer = extractFaces(model, 0, scene.capture(), nullptr, economic);
+  EXPECT_LT(fewer.count(), faces.count() * 9 / 10);
+  for (const uint32_t face : fewer.numbers()) EXPECT_TRUE(faces.contains(face));
+  model.level(0).keepFaces(fewer.bits());
+  EXPECT_GT(heldOutPsnr(scene, model), withAll - 0.3) << "what contributes least was dropped";
   model.level(0).keepFaces(FaceSet(model.level(0).domain().grids).bits());
   EXPECT_LT(heldOutPsnr(scene, model), before - 3) << "without faces nothing is left";
   model.level(0).keepFaces({});
@@ -174,7 +182,7 @@ TEST(MeshTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
 TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
   const CubeScene scene;
   TrainedCube coarse(scene, cubeConfig(), 300);
-  const SurfaceSurvey survey(scene.capture(), coarse.trainer->model());
+  const SurfaceSurvey survey(scene.capture(), coarse.trainer->model(), true);
   const MeshPart block{"block_0_0", 0, coarse.frame, {1, 1, 1}};
   const OctahedraDomain domain = makeOctahedraDomain(block, 32, OctahedraPlacement::checkerboard);
   const MeshStart start = survey.findStart(block, domain);
@@ -200,7 +208,7 @@ TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
   // In cells that photos see, vertices start near the cube's surface, not in the middle of their cells. Those at its
   // edges, where the mean of its points is within it, are left out.
   const OctahedraDomain wide = makeOctahedraDomain(block, 20, OctahedraPlacement::checkerboard);
-  const std::vector<float> displacements = survey.findStart(block, wide).displacements;
+  const std::vector<float> displacements = survey.findDisplacements(block, wide);
   double fromSurface = 0, fromMiddle = 0;
   size_t moved = 0;
   const OctahedraGrid& grid = wide.grids[0];

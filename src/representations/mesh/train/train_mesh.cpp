@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <optional>
 
 #include "base/error.h"
 #include "base/log.h"
@@ -190,11 +192,17 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
     return sum;  // only the coarse field
   }
 
+  // Vertices start at the surface only in blocks whose training begins now.
+  const auto startsAtSurface = [&](const MeshPart& part) {
+    return config.surfaceStart && !part.isBackground() && isRequested(part.name) && !partFolder(model, part).manifest();
+  };
+  std::optional<SurfaceSurvey> survey;
   std::vector<PlannedPart> planned;
   fs::path coarseFile;
   {
     const auto coarse = loadFieldModel(device, coarseFolder(model).root());
-    planned = planParts(capture, parts, SurfaceSurvey(capture, *coarse), config);
+    survey.emplace(capture, *coarse, std::any_of(parts.begin(), parts.end(), startsAtSurface));
+    planned = planParts(capture, parts, *survey, config);
     coarseFile = coarseFolder(model).root() / requireManifest(coarseFolder(model)).files.at(0);
   }
   const Safetensors coarseState = readSafetensors(coarseFile);
@@ -217,6 +225,8 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
     }
     shareLeft -= plan.share;
     const double pixels = plan.start.pixels();
+    if (startsAtSurface(plan.part))
+      plan.start.displacements = survey->findDisplacements(plan.part, config.domain(plan.part, 0));
     MeshTrainer trainer(device, capture, config, plan.part, std::move(plan.start));
     if (config.exposure) trainer.useExposures(coarseFile, coarseState);
     inform("{}: {:.0f} pixels of the photos show it", plan.part.name, pixels);
