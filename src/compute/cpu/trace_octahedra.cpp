@@ -189,14 +189,13 @@ struct Table {
 #endif
 };
 
-// The vertices of the 27 cells around one relative to a ray, sheared so that the ray is the z axis.
-class ShearedVertices {
- public:
-  // `rows`: the displacements of the three cells along x, in the order of y, then z. `origin`: a point of the ray
-  // relative to the centre of the middle cell; `shear`: its step along x and y for one along z; `sign`: of its step
-  // along z.
-  HWY_INLINE void set(const float* const rows[9], const float origin[3], const float shear[2], float sign, int z) {
-    const int x = z == 2 ? 0 : z + 1, y = z == 0 ? 2 : z - 1;
+// The vertices of the 27 cells around one, relative to its centre.
+struct VerticesAround {
+  uint32_t cell = 0xffffffffu;  // in all grids
+  alignas(64) float at[3][kSlots];
+
+  // `rows`: the displacements of the three cells along x, in the order of y, then z.
+  HWY_INLINE void set(const float* const rows[9]) {
     const Float d;
 #if HWY_TARGET == HWY_AVX3
     Floats all[2][3];
@@ -209,43 +208,20 @@ class ShearedVertices {
     std::memcpy(around + 45, rows[8], 12);
     std::memcpy(around + 75, rows[8] + 3, 24);
 #endif
-    const Floats shearX = hn::Set(d, shear[0]), shearY = hn::Set(d, shear[1]), signs = hn::Set(d, sign);
-    for (int first = 0, part = 0; first < kSlots; first += static_cast<int>(hn::Lanes(d)), ++part) {
-      Floats at[3];
+    for (int first = 0; first < kSlots; first += static_cast<int>(hn::Lanes(d))) {
+      Floats displacements[3];
 #if HWY_TARGET == HWY_AVX3
-      for (int axis = 0; axis < 3; ++axis) at[axis] = all[part][axis];
+      for (int axis = 0; axis < 3; ++axis) displacements[axis] = all[first / 16][axis];
 #else
-      hn::LoadInterleaved3(d, around + 3 * first, at[0], at[1], at[2]);
+      hn::LoadInterleaved3(d, around + 3 * first, displacements[0], displacements[1], displacements[2]);
 #endif
       for (int axis = 0; axis < 3; ++axis)
-        at[axis] = hn::Sub(hn::Add(hn::Load(d, kSlotOffsets.at[axis] + first), at[axis]), hn::Set(d, origin[axis]));
-      // Not at[z], which would be looked up in memory.
-      const Floats atX = x == 0   ? at[0]
-                         : x == 1 ? at[1]
-                                  : at[2],
-                   atY = y == 0   ? at[0]
-                         : y == 1 ? at[1]
-                                  : at[2],
-                   atZ = z == 0   ? at[0]
-                         : z == 1 ? at[1]
-                                  : at[2];
-      put(tables[0], part, first, hn::NegMulAdd(shearX, atZ, atX));
-      put(tables[1], part, first, hn::NegMulAdd(shearY, atZ, atY));
-      put(tables[2], part, first, hn::Mul(atZ, signs));
+        hn::Store(hn::Add(hn::Load(d, kSlotOffsets.at[axis] + first), displacements[axis]), d, at[axis] + first);
     }
   }
 
-  Table tables[3];
-
+#if HWY_TARGET == HWY_AVX3
  private:
-  static HWY_INLINE void put(Table& table, [[maybe_unused]] int part, [[maybe_unused]] int first, Floats values) {
-#if HWY_TARGET == HWY_AVX3
-    (part == 0 ? table.low : table.high) = values;
-#else
-    hn::Store(values, Float(), table.values + first);
-#endif
-  }
-#if HWY_TARGET == HWY_AVX3
   // Coordinates by vector of slots and axis.
   static HWY_INLINE void deinterleave(const float* const rows[9], Floats all[2][3]) {
     // The 27 numbers of three rows fill one vector, and 11 lanes of another.
@@ -268,6 +244,50 @@ class ShearedVertices {
     }
   }
 #endif
+};
+
+// Those of the last cells that rays crossed, as neighbouring rays cross the same ones.
+class RecentVertices {
+ public:
+  HWY_INLINE VerticesAround& place(const int cell[3]) {
+    return entries_[static_cast<uint32_t>(cell[0] + 5 * cell[1] + 3 * cell[2]) % kEntries];
+  }
+
+ private:
+  static constexpr uint32_t kEntries = 16;
+  VerticesAround entries_[kEntries];
+};
+
+// Vertices relative to a ray, sheared so that the ray is the z axis.
+class ShearedVertices {
+ public:
+  // `origin`: a point of the ray relative to the centre of the middle cell; `shear`: its step along x and y for
+  // one along z; `sign`: of its step along z.
+  HWY_INLINE void set(const VerticesAround& vertices, const float origin[3], const float shear[2], float sign, int z) {
+    const int x = z == 2 ? 0 : z + 1, y = z == 0 ? 2 : z - 1;
+    const Float d;
+    const Floats shearX = hn::Set(d, shear[0]), shearY = hn::Set(d, shear[1]), signs = hn::Set(d, sign);
+    for (int first = 0, part = 0; first < kSlots; first += static_cast<int>(hn::Lanes(d)), ++part) {
+      const auto at = [&](int axis) HWY_ATTR {
+        return hn::Sub(hn::Load(d, vertices.at[axis] + first), hn::Set(d, origin[axis]));
+      };
+      const Floats atX = at(x), atY = at(y), atZ = at(z);
+      put(tables[0], part, first, hn::NegMulAdd(shearX, atZ, atX));
+      put(tables[1], part, first, hn::NegMulAdd(shearY, atZ, atY));
+      put(tables[2], part, first, hn::Mul(atZ, signs));
+    }
+  }
+
+  Table tables[3];
+
+ private:
+  static HWY_INLINE void put(Table& table, [[maybe_unused]] int part, [[maybe_unused]] int first, Floats values) {
+#if HWY_TARGET == HWY_AVX3
+    (part == 0 ? table.low : table.high) = values;
+#else
+    hn::Store(values, Float(), table.values + first);
+#endif
+  }
 };
 
 // Twice the signed areas of the ray with each edge: the barycentric coordinates of the opposite vertices.
@@ -427,7 +447,8 @@ struct LineHits {
 // Tests a ray against the faces in the cells that it crosses.
 class FaceTest {
  public:
-  FaceTest(const TracedOctahedra& all, const Crossing& crossing, PendingHits& pending, TaskHits& hits)
+  FaceTest(const TracedOctahedra& all, const Crossing& crossing, RecentVertices& recent, PendingHits& pending,
+           TaskHits& hits)
       : all_(all),
         crossing_(crossing),
         grid_(all.a.grids[crossing.grid]),
@@ -435,6 +456,7 @@ class FaceTest {
         firstCell_(crossing.grid * grid_.cells()),
         displacements_(hostPointer(all.a.displacements) + size_t{3} * firstCell_),
         keptFaces_(hostPointer(all.a.keptFaces)),
+        recent_(recent),
         pending_(pending),
         hits_(hits),
         positionScale_(grid_.positionScale()) {
@@ -451,14 +473,20 @@ class FaceTest {
     const Float d;
     const Int ints;
     const Floats zero = hn::Zero(d);
-    const float* rows[9];
-    alignas(64) float around[81];
-    listRows(cell, around, rows);
     float origin[3];  // of the ray, relative to the centre of the cell
     for (int axis = 0; axis < 3; ++axis)
       origin[axis] =
           static_cast<float>(crossing_.entry[axis] + crossed.enter * crossing_.step[axis] - (cell[axis] + 0.5));
-    hits.vertices.set(rows, origin, shear_, sign_, crossing_.z);
+    const uint32_t number = firstCell_ + static_cast<uint32_t>(cell[0] + n_ * (cell[1] + n_ * cell[2]));
+    VerticesAround& around = recent_.place(cell);
+    if (around.cell != number) {
+      const float* rows[9];
+      float border[81];
+      listRows(cell, border, rows);
+      around.set(rows);
+      around.cell = number;
+    }
+    hits.vertices.set(around, origin, shear_, sign_, crossing_.z);
     const ShearedVertices vertices = hits.vertices;
     size_t count = 0;
     for (int firstCandidate = 0; firstCandidate < faces.count; firstCandidate += static_cast<int>(hn::Lanes(d))) {
@@ -498,7 +526,8 @@ class FaceTest {
       const Floats total = hn::Add(areas.u, hn::Add(areas.v, areas.w));
       const Floats weighted =
           hn::MulAdd(areas.w, z.lookup(c), hn::MulAdd(areas.v, z.lookup(b), hn::Mul(areas.u, z.lookup(a))));
-      const Floats along = hn::Div(weighted, total);
+      const Floats inverse = hn::Div(hn::Set(d, 1.0f), total);
+      const Floats along = hn::Mul(weighted, inverse);
       const auto isNear =
           hn::And(hn::FirstN(d, hits.count - firstHit), hn::And(hn::Ge(along, lowest), hn::Le(along, highest)));
       uint8_t bytes[8] = {};
@@ -507,8 +536,8 @@ class FaceTest {
       if (bits == 0) continue;
       alignas(64) float alongs[16], second[16], third[16];
       hn::Store(along, d, alongs);
-      hn::Store(hn::Div(areas.v, total), d, second);
-      hn::Store(hn::Div(areas.w, total), d, third);
+      hn::Store(hn::Mul(areas.v, inverse), d, second);
+      hn::Store(hn::Mul(areas.w, inverse), d, third);
       for (; bits != 0; bits &= bits - 1) {
         const uint32_t lane = static_cast<uint32_t>(std::countr_zero(bits));
         const double s = crossed.enter + double{alongs[lane]};
@@ -590,8 +619,8 @@ class FaceTest {
     return s != pending_.s[place] ? s < pending_.s[place] : face < pending_.faces[place].face;
   }
   // Lists the displacements of the three cells along x, in the order of y, then z. At the border of the grid, they are
-  // in `around`, with NaN for cells that do not exist.
-  HWY_INLINE void listRows(const int cell[3], float around[81], const float* rows[9]) const {
+  // in `border`, with NaN for cells that do not exist.
+  HWY_INLINE void listRows(const int cell[3], float border[81], const float* rows[9]) const {
     const auto isInner = [&](int at) { return at > 0 && at < n_ - 1; };
     const bool inside = isInner(cell[0]) && isInner(cell[1]) && isInner(cell[2]);
     const int64_t first = 3 * (cell[0] - 1 + int64_t{n_} * (cell[1] - 1 + int64_t{n_} * (cell[2] - 1)));
@@ -604,11 +633,11 @@ class FaceTest {
     for (int row = 0; row < 9; ++row) {
       const int y = cell[1] + row % 3 - 1, z = cell[2] + row / 3 - 1;
       const int64_t from = first + 3 * int64_t{n_} * (row % 3 + int64_t{n_} * (row / 3));
-      rows[row] = around + 9 * row;
+      rows[row] = border + 9 * row;
       for (int i = 0; i < 3; ++i) {
         const bool exists = !isBeyond(cell[0] - 1 + i) && !isBeyond(y) && !isBeyond(z);
         for (int axis = 0; axis < 3; ++axis)
-          around[9 * row + 3 * i + axis] =
+          border[9 * row + 3 * i + axis] =
               exists ? displacements_[from + 3 * i + axis] : std::numeric_limits<float>::quiet_NaN();
       }
     }
@@ -621,6 +650,7 @@ class FaceTest {
   const uint32_t firstCell_;          // of the grid
   const float* const displacements_;  // of the grid
   const uint32_t* const keptFaces_;   // of all grids; null: all are
+  RecentVertices& recent_;
   PendingHits& pending_;
   TaskHits& hits_;
   const float positionScale_;
@@ -655,6 +685,7 @@ void traceRays(const TracedOctahedra& all, uint32_t begin, uint32_t end, TraceSc
   std::fill(hitCounts, hitCounts + (end - begin), 0u);
   const uint32_t lanes = Walk::lanes();
   LineHits lineHits[kCellsAtATime];
+  RecentVertices recent;
   for (size_t group = 0; group < crossings.size(); group += 2 * lanes) {
     const uint32_t count = static_cast<uint32_t>(std::min<size_t>(2 * lanes, crossings.size() - group));
     // Two walks at a time, as each step of a walk waits for the one before.
@@ -672,7 +703,7 @@ void traceRays(const TracedOctahedra& all, uint32_t begin, uint32_t end, TraceSc
       uint32_t& hitCount = hitCounts[crossing.ray - begin];
       if (hitCount >= all.a.maximum) continue;
       const size_t firstHit = hits.count() - hitCount;
-      FaceTest test(all, crossing, scratch.pending, hits);
+      FaceTest test(all, crossing, recent, scratch.pending, hits);
       bool wantsMore = true;
       const CrossedCell* const cells = &scratch.cells[lane * scratch.cellsOfRay];
       for (size_t i = 0; wantsMore && i < scratch.cellCounts[lane]; i += kCellsAtATime) {
