@@ -74,7 +74,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       finalShareSetting(),
       droppedShareSetting(),
       patchTexelsSetting(),
-      distortionWeightSetting().byDefault(0.02),
+      distortionWeightSetting(),
       depthWeightSetting(),
       depthToleranceSetting(),
       sparseDepthRayFractionSetting(),
