@@ -176,7 +176,8 @@ class MeshBaker final : public Baker {
     }
     ExtractionSettings extraction;
     extraction.photoStride = options_.stride << sceneLevel;
-    extraction.droppedShare = model.config().droppedShare;
+    // Triangles of coarse levels are few, and holes in them are large.
+    if (level == 0) extraction.droppedShare = model.config().droppedShare;
     if (model.part().isBackground()) extraction.raysPerCell = 0;
     const FaceSet faces = extractFaces(model, level, capture, nullptr, extraction, [this](int64_t done, int64_t) {
       options_.onPhoto(passesDone_ * photosToCome_ + done, passes_ * photosToCome_);
