@@ -105,11 +105,11 @@ struct VerticesAround {
 class RecentVertices {
  public:
   HWY_INLINE VerticesAround& place(const int cell[3]) {
-    return entries_[static_cast<uint32_t>(cell[0] + 5 * cell[1] + 3 * cell[2]) % kEntries];
+    return entries_[static_cast<uint32_t>(cell[0] + 5 * cell[1] + 19 * cell[2]) % kEntries];
   }
 
  private:
-  static constexpr uint32_t kEntries = 16;
+  static constexpr uint32_t kEntries = 64;
   VerticesAround entries_[kEntries];
 };
 
