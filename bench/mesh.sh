@@ -329,7 +329,7 @@ killed() {
   local started=$SECONDS kills=0 lasted
   rm -rf "$work/tiny-killed" "$work"/tiny-*.scene
   tiny tiny-timed
-  lasted=$(((SECONDS - started) / 3 + 1))
+  lasted=$((SECONDS - started))
   rm -rf "$work/tiny-timed"
   while [ "$kills" -lt 10 ]; do
     if interrupted train "$work/tiny" "$work/tiny-killed" "${tiny_flags[@]}" --resume --checkpoint-seconds 0.3; then
