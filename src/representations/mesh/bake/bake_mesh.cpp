@@ -4,7 +4,9 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 
+#include "compute/rows.h"
 #include "representations/mesh/train/mesh_patches.h"
 
 namespace tessera {
@@ -48,11 +50,19 @@ class TexelField {
         settings_(settings),
         placesPerEdge_(placesPerEdge(level)) {
     Device& device = model.device();
+    if (const CoarseAtlas* const fitted = model.coarseAtlas(level)) {
+      placesPerEdge_ = 1;
+      fitted_ = device.read(
+          fitted->texels.values.part(0, patches.size() * settings.patchEdge * settings.patchEdge * kMeshFeatures));
+    }
     model.field().reserve(kPlacesAtATime);
     positions_ = device.array<float>(size_t{3} * kPlacesAtATime);
     encoded_ = device.array<float>(size_t{kMeshFeatures} * kPlacesAtATime);
     if (!settings.baseColours) return;
     patchOfPlace_ = device.array<uint32_t>(kPlacesAtATime);
+    std::vector<uint32_t> all(kPlacesAtATime);
+    std::iota(all.begin(), all.end(), 0);
+    everyPlace_ = device.uploadArray(all);
     std::vector<float> directions;
     for (const TrianglePatch& patch : patches) {
       Vec3f sum = faces.direction(list.faceOfTriangle[patch.triangles[0]]);
@@ -78,8 +88,15 @@ class TexelField {
 
  private:
   std::vector<float> evaluate(size_t firstTexel, uint32_t places) {
+    if (!fitted_.empty()) {
+      const auto begin = fitted_.begin() + static_cast<ptrdiff_t>(kMeshFeatures * firstTexel);
+      const std::vector<float> features(begin, begin + ptrdiff_t{kMeshFeatures} * places);
+      model_.device().write(encoded_.all(), std::span<const float>(features));
+      for (uint32_t i = 0; i < places; ++i)
+        patchOfPlaces_[i] = static_cast<uint32_t>((firstTexel + i) / (settings_.patchEdge * settings_.patchEdge));
+      return features;
+    }
     std::vector<float> positions(size_t{3} * kPlacesAtATime);
-    patchOfPlaces_.assign(kPlacesAtATime, 0);
     const uint32_t edge = settings_.patchEdge, perTexel = placesPerEdge_ * placesPerEdge_;
     for (uint32_t i = 0; i < places; ++i) {
       const size_t texel = firstTexel + i / perTexel;
@@ -104,11 +121,13 @@ class TexelField {
   std::vector<float> evaluateColours(uint32_t places) {
     Device& device = model_.device();
     device.write(patchOfPlace_.all(), std::span<const uint32_t>(patchOfPlaces_));
-    const MeshField::Output output = model_.field().forward({places}, positions_, directions_, patchOfPlace_, false);
+    device.run(GatherRows{
+        {places}, everyPlace_, Matrix<const float>(encoded_, kMeshFeatures), model_.field().decoderFeatures()});
+    const Matrix<const float> output = model_.field().decode({places}, directions_, patchOfPlace_);
     std::vector<float> colours(size_t{3} * places);
-    const std::vector<float> all = device.read(output.colours.data);
+    const std::vector<float> all = device.read(output.data);
     for (size_t i = 0; i < places; ++i)
-      for (size_t c = 0; c < 3; ++c) colours[3 * i + c] = all[output.colours.rowStride * i + c];
+      for (size_t c = 0; c < 3; ++c) colours[3 * i + c] = all[output.rowStride * i + c];
     return colours;
   }
 
@@ -129,9 +148,10 @@ class TexelField {
   const std::vector<TrianglePatch>& patches_;
   const MeshBakeSettings& settings_;
   uint32_t placesPerEdge_;
+  std::vector<float> fitted_;  // the texels of a level that was fitted, [texels][kMeshFeatures]; else empty
   Array<float> positions_, encoded_, directions_;
-  Array<uint32_t> patchOfPlace_;
-  std::vector<uint32_t> patchOfPlaces_;
+  Array<uint32_t> patchOfPlace_, everyPlace_;
+  std::vector<uint32_t> patchOfPlaces_ = std::vector<uint32_t>(kPlacesAtATime);
 };
 
 }  // namespace
@@ -160,8 +180,8 @@ BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces,
     range.low = std::numeric_limits<float>::infinity();
     range.high = -range.low;
   }
-  const bool hasRanges = level == 0 && model.atlas();  // those that training has used
-  for (uint32_t f = 0; hasRanges && f < kMeshFeatures; ++f)
+  const bool hasRanges = level == 0 ? model.atlas().has_value() : model.coarseAtlas(level) != nullptr;
+  for (uint32_t f = 0; hasRanges && f < kMeshFeatures; ++f)  // those that training has used
     baked.ranges[f] = {model.atlas()->ranges[2 * f], model.atlas()->ranges[2 * f + 1]};
   if (!hasRanges)
     field.forEachTexel(false, [&](size_t number, const FieldTexel& texel) {

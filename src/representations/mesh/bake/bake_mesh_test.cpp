@@ -203,7 +203,6 @@ class AtlasStageTest : public testing::Test {
  protected:
   // Performs the first `performed` of `steps` steps.
   void train(MeshConfig config, int64_t steps, int64_t performed) {
-    config.meshLevels = 1;
     const MeshPart part{"block_0_0", 0, fitSceneFrame(scene_.capture(), 0.5), {1, 1, 1}};
     MeshStart start;
     start.cells.assign(config.domain(part, 0).grids[0].cells(), true);
@@ -217,8 +216,9 @@ class AtlasStageTest : public testing::Test {
   MeshModel& model() { return trainer_->model(); }
 
   // PSNR of the baked patches over held-out photos.
-  double bakedPsnr() {
-    const BakedPatches patches = bakePatches(model(), 0, model().atlas()->faces, {});
+  double bakedPsnr(uint32_t level = 0) {
+    const BakedPatches patches =
+        bakePatches(model(), level, level == 0 ? model().atlas()->faces : model().coarseAtlas(level)->faces, {});
     const MeshTracer tracer = makeBakedTracer(patches);
     const BakedShading shading(patches);
     const SceneFrame& frame = model().frame();
@@ -250,11 +250,13 @@ class AtlasStageTest : public testing::Test {
 
 TEST_F(AtlasStageTest, SeesWhatIsDrawnOfTheBakedPatches) {
   MeshConfig config = smallMeshConfig();
+  config.meshLevels = 1;
   config.finalShare = 0.2;
   train(config, 200, 200);
   ASSERT_TRUE(model().atlas());
   ASSERT_GT(model().atlas()->faces.count(), 100u);
-  AtlasStage stage(model(), TexelAtlas(model(), model().atlas()->faces, model().atlas()->patchEdge), kRays, 1 << 14);
+  AtlasStage stage(model(), 0, TexelAtlas(model(), 0, model().atlas()->faces, model().atlas()->patchEdge), kRays,
+                   1 << 14);
   PhotoRays::Settings settings;
   settings.maxRays = kRays;
   PhotoRays rays(*device_, scene_.capture(), model().frame(), settings);
@@ -262,7 +264,7 @@ TEST_F(AtlasStageTest, SeesWhatIsDrawnOfTheBakedPatches) {
   PhotoLoss loss(*device_, scene_.capture(), config, kRays);
   Array<float> losses = device_->array<float>(AtlasStage::kLosses);
   Array<uint32_t> counters = device_->array<uint32_t>(AtlasStage::kCounters);
-  stage.addGradients(rays, loss, losses, counters);
+  stage.addGradients(rays, rays.count(), loss, losses, counters);
   const std::vector<uint32_t> counts = device_->read(counters.all());
   ASSERT_EQ(counts[1], kRays) << "all rays fit";
   EXPECT_GT(counts[2], counts[0]) << "a hit has up to four texels";
@@ -292,12 +294,45 @@ TEST_F(AtlasStageTest, SeesWhatIsDrawnOfTheBakedPatches) {
 
 TEST_F(AtlasStageTest, MakesContentsLookMoreLikeThePhotos) {
   MeshConfig config = smallMeshConfig();
+  config.meshLevels = 1;
   config.finalShare = 0.3;
   constexpr int64_t kSteps = 400, kFirst = 280;
   train(config, kSteps, kFirst + 1);  // the atlas is there, and hardly trained
   const double before = bakedPsnr();
   for (int64_t step = kFirst + 1; step < kSteps; ++step) trainer_->step(step, kSteps);
   EXPECT_GT(bakedPsnr(), before + 0.5);
+}
+
+TEST_F(AtlasStageTest, FitsCoarseLevelsThatLookAlmostAsTheFinestAndDoNotChangeIt) {
+  MeshConfig config = smallMeshConfig();
+  config.meshCells = 32;
+  config.meshLevels = 2;
+  config.finalShare = 0.3;
+  constexpr int64_t kSteps = 400, kFirst = 280;
+  train(config, kSteps, kFirst);
+  EXPECT_EQ(model().levels(), 1u) << "there are no coarse levels before the final stage";
+  trainer_->step(kFirst, kSteps);
+  ASSERT_EQ(model().levels(), 2u);
+  ASSERT_NE(model().coarseAtlas(1), nullptr);
+  const size_t finest = model().atlas()->faces.count(), coarse = model().coarseAtlas(1)->faces.count();
+  EXPECT_GT(coarse, 50u);
+  EXPECT_LT(static_cast<double>(coarse), 0.4 * static_cast<double>(finest));
+  const double before = bakedPsnr(1);
+  for (int64_t step = kFirst + 1; step < kSteps; ++step) trainer_->step(step, kSteps);
+  EXPECT_GT(bakedPsnr(1), before + 0.3) << "its texels are trained";
+  EXPECT_GT(bakedPsnr(1), bakedPsnr(0) - 2.5);
+  std::map<std::string, Bytes> tensors[2];
+  for (auto& ofTraining : tensors) {
+    const Bytes checkpoint = trainer_->save(0);
+    const std::optional<Safetensors> file = decodeSafetensors(checkpoint);
+    ASSERT_TRUE(file);
+    for (const auto& [name, tensor] : file->tensors)
+      if (!name.starts_with("level1.")) ofTraining[name] = Bytes(tensor.bytes.begin(), tensor.bytes.end());
+    config.meshLevels = 1;
+    train(config, kSteps, kSteps);
+  }
+  EXPECT_TRUE(tensors[0] == tensors[1]);
+  EXPECT_GT(tensors[0].size(), 10u);
 }
 
 }  // namespace

@@ -129,8 +129,10 @@ class MeshBaker final : public Baker {
           const Vec3d at = sceneFromPart(model) * baked.centre(patch);
           patchesOfGroup[groupAt(groups, block, at)].push_back(patch);
         }
-        const BlockEncoder encoder = makeBlockEncoder(model, level);
-        for (auto& [group, patches] : patchesOfGroup) addPatches(baked, patches, model, &encoder, growing[group]);
+        std::optional<BlockEncoder> encoder;
+        if (!isFitted(model, level)) encoder = makeBlockEncoder(model, level);
+        for (auto& [group, patches] : patchesOfGroup)
+          addPatches(baked, patches, model, encoder ? &*encoder : nullptr, growing[group]);
       }
       for (const uint32_t group : groupsOfBlock) {
         if (--growing[group].blocksToCome > 0) continue;
@@ -160,9 +162,13 @@ class MeshBaker final : public Baker {
 
   // The level of a part that a level of the scene shows: the coarsest, if it has fewer.
   static uint32_t findModelLevel(MeshModel& model, uint32_t level) { return std::min(level, model.levels() - 1); }
+  // Whether the level has texels of its own.
+  static bool isFitted(MeshModel& model, uint32_t level) {
+    return model.coarseAtlas(findModelLevel(model, level)) != nullptr;
+  }
   // Whether the faces are not those of the final stage of training, so that the photos must be looked through.
   static bool isExtracted(MeshModel& model, uint32_t level) {
-    return !model.atlas() || findModelLevel(model, level) > 0;
+    return findModelLevel(model, level) == 0 ? !model.atlas() : !isFitted(model, level);
   }
 
   BakedPatches bakePart(const Capture& capture, MeshModel& model, uint32_t sceneLevel) {
@@ -170,7 +176,12 @@ class MeshBaker final : public Baker {
     MeshBakeSettings settings;
     settings.patchEdge = settings_.patchEdge;
     settings.baseColours = settings_.fallback;
-    settings.texels = settings_.fallback || model.part().isBackground();  // else MapInference makes them
+    // Else MapInference makes them.
+    settings.texels = settings_.fallback || model.part().isBackground() || isFitted(model, sceneLevel);
+    if (isFitted(model, sceneLevel)) {
+      settings.patchEdge = model.atlas()->patchEdge;
+      return bakePatches(model, level, model.coarseAtlas(level)->faces, settings);
+    }
     if (!isExtracted(model, sceneLevel)) {
       return bakePatches(model, 0, model.atlas()->faces, settings);
     }
@@ -251,7 +262,8 @@ class MeshBaker final : public Baker {
     return {std::make_shared<SharedEncoder>(std::move(encoder)), std::move(inference), placement, resource};
   }
 
-  // Adds the patches as one part, or several if they do not fit one. `encoder`: of a block.
+  // Adds the patches as one part, or several if they do not fit one. `encoder`: of a block, if its texels are the
+  // encoder's output.
   void addPatches(const BakedPatches& baked, const std::vector<uint32_t>& patches, const MeshModel& model,
                   const BlockEncoder* encoder, GrowingContent& to) const {
     const Bc4Effort effort = options_.effort >= kExhaustiveFromEffort ? Bc4Effort::exhaustive : Bc4Effort::fast;
@@ -337,7 +349,9 @@ class MeshBaker final : public Baker {
     const double region = std::max({2.0 * grid_.columns, 2.0 * grid_.rows, frame_.top - frame_.bottom});
     const double cell = isBackground ? region / config.backgroundCells
                                      : 2.0 * tilesPerBlock_ / (1 - 2 * kBlockMargin) / (config.meshCells >> level);
-    return std::numbers::sqrt2 * cell / (settings_.patchEdge - 1);
+    const bool isOfTraining = !isBackground && level > 0 && config.fitsLevels();
+    const uint32_t patchEdge = isOfTraining ? static_cast<uint32_t>(config.patchTexels) : settings_.patchEdge;
+    return std::numbers::sqrt2 * cell / (patchEdge - 1);
   }
 
   TrainedMesh mesh_;

@@ -27,8 +27,9 @@ struct AtlasStage::Step {
   Matrix<const float> colours = {};  // of the hits
 };
 
-AtlasStage::AtlasStage(MeshModel& model, TexelAtlas atlas, uint32_t maxRays, uint32_t hitCapacity)
+AtlasStage::AtlasStage(MeshModel& model, uint32_t level, TexelAtlas atlas, uint32_t maxRays, uint32_t hitCapacity)
     : model_(model),
+      level_(level),
       device_(model.device()),
       atlas_(std::move(atlas)),
       texelCapacity_(kTexelsPerHit * hitCapacity),
@@ -49,14 +50,18 @@ AtlasStage::AtlasStage(MeshModel& model, TexelAtlas atlas, uint32_t maxRays, uin
   opacity_ = device_.array<float>(maxRays);
   for (Array<float>* perRay : {&colour_, &skyColour_, &ditherColourGradients_})
     *perRay = device_.array<float>(size_t{3} * maxRays);
+  if (level > 0) features_ = device_.array<float>(size_t{kStoredFeatures} * texelCapacity_);
   model.field().reserve(texelCapacity_);
 }
 
-void AtlasStage::addGradients(const PhotoRays& rays, PhotoLoss& photoLoss, Slice<float> losses,
+Matrix<float> AtlasStage::encodedFeatures() {
+  return level_ == 0 ? model_.field().encodedFeatures() : Matrix<float>(features_, kStoredFeatures);
+}
+
+void AtlasStage::addGradients(const PhotoRays& rays, uint32_t count, PhotoLoss& photoLoss, Slice<float> losses,
                               Slice<uint32_t> counters) {
   MeshField& field = model_.field();
   hits_.counters = counters.part(0, MeshHits::kCounters);
-  const uint32_t count = rays.count();
   Step step{rays,
             count,
             hits_.samples(),
@@ -65,13 +70,13 @@ void AtlasStage::addGradients(const PhotoRays& rays, PhotoLoss& photoLoss, Slice
             counters.part(MeshHits::kCounters, 1),
             rays.directions(0, count),
             losses};
-  model_.level(0).trace({count, rays.origins(0, count), step.directions, {}}, kMaxAtlasHits, false, hits_);
+  model_.level(level_).trace({count, rays.origins(0, count), step.directions, {}}, kMaxAtlasHits, false, hits_);
   lookUp(step);
   step.colours = field.decode(step.hits, step.directions, hits_.rayOfSample);
   composite(step, photoLoss);
 
   const Matrix<const float> featureGradients =
-      field.decodeBackward(step.hits, Matrix<const float>(colourGradients_, 3));
+      field.decodeBackward(step.hits, Matrix<const float>(colourGradients_, 3), level_ == 0);
   const Matrix<float> storedGradients(storedGradients_, kStored);
   device_.fillZero(storedGradients_.all());
   const auto mixBack = [&](const Matrix<const float>& gradients, const Matrix<float>& to) {
@@ -82,12 +87,17 @@ void AtlasStage::addGradients(const PhotoRays& rays, PhotoLoss& photoLoss, Slice
   StoreTexelsBackward back;
   back.rows = step.texels;
   back.offset = model_.opacityOffset();
-  back.features = field.encodedFeatures();
+  back.features = encodedFeatures();
   back.ranges = ranges_;
   back.storedGradients = storedGradients;
   back.featureGradients = Matrix<float>(featureGradients_, kStoredFeatures);
   device_.run(back);
-  field.encodeBackward(step.texels, texelPositions_, back.featureGradients);
+  if (level_ == 0) {
+    field.encodeBackward(step.texels, texelPositions_, back.featureGradients);
+  } else {
+    device_.run(ScatterRows{step.texels, rowIds_, back.featureGradients,
+                            Matrix<float>(model_.coarseAtlas(level_)->texels.gradients, kStoredFeatures)});
+  }
 }
 
 // Evaluates the encoder at the texels that the hits need, and mixes these for each hit.
@@ -115,14 +125,20 @@ void AtlasStage::lookUp(const Step& step) {
   distinct.rows = rows_;
   distinct.rowCount = step.texelCounter;
   device_.run(distinct);
-  device_.run(GatherRows{step.texels, rowIds_, atlas_.positions(), Matrix<float>(texelPositions_, 3)});
-  field.encodeForBackward(step.texels, texelPositions_);
+  if (level_ == 0) {
+    device_.run(GatherRows{step.texels, rowIds_, atlas_.positions(), Matrix<float>(texelPositions_, 3)});
+    field.encodeForBackward(step.texels, texelPositions_);
+  } else {
+    device_.run(GatherRows{step.texels, rowIds_,
+                           Matrix<const float>(model_.coarseAtlas(level_)->texels.values.all(), kStoredFeatures),
+                           encodedFeatures()});
+  }
   StoreTexelsForward store;
   store.rows = step.texels;
   store.offset = model_.opacityOffset();
   store.opaqueFrom = StoredOpacity::kOpaqueFrom;
   store.transparentBelow = StoredOpacity::kTransparentBelow;
-  store.features = field.encodedFeatures();
+  store.features = encodedFeatures();
   store.ranges = ranges_;
   store.stored = Matrix<float>(stored_, kStored);
   device_.run(store);

@@ -72,6 +72,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       lossParameterSetting(),
       opaqueLossSetting(),
       finalShareSetting(),
+      fittedLevelsSetting(),
       droppedShareSetting(),
       patchTexelsSetting(),
       distortionWeightSetting(),

@@ -71,6 +71,11 @@ struct MeshConfig : BackgroundBlockSettings,
   SETTING(double, finalShare, 0.2, "final_share",
           "share of the steps for the final stage, which trains through texels as they are baked; 0: none",
           within(0, 0.9));
+  SETTING(
+      bool, fittedLevels, true, "fitted_levels",
+      "the final stage fits the coarser levels to the finest one; else, and without a final stage, their vertices are "
+      "trained with it",
+      anything());
   SETTING(double, droppedShare, 0.005, "dropped_share",
           "of what all triangles contribute to the rays of photos and those from above: the triangles with the least, "
           "which have this share together, are dropped",
@@ -93,6 +98,7 @@ struct MeshConfig : BackgroundBlockSettings,
   bool hasBackground() const { return backgroundBlock == "own"; }
   // The number of steps before the final stage; 0 if the number of all is unknown.
   int64_t stepsBeforeFinalStage(int64_t plannedSteps) const;
+  bool fitsLevels() const { return fittedLevels && finalShare > 0; }
   OctahedraDomain domain(const MeshPart& part, uint32_t level) const;
 };
 

@@ -18,8 +18,8 @@ constexpr double kElevations[] = {60, 45, 30};  // degrees above the horizon fro
 // Follows the rays through the pixels of photos.
 class PhotoFaces final : public PixelVisitor {
  public:
-  PhotoFaces(MeshModel& model, FaceMarker& marker)
-      : model_(model), marker_(marker), imageRays_(model.device(), FaceMarker::kMaxRays) {}
+  PhotoFaces(MeshModel& model, RayFollower& follower)
+      : model_(model), follower_(follower), imageRays_(model.device(), RayFollower::kMaxRays) {}
 
   void begin(const Photo& photo, const Camera& camera) override {
     imageRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
@@ -27,18 +27,18 @@ class PhotoFaces final : public PixelVisitor {
   void visit(std::span<const float> pixels, SeenThrough) override {
     while (!pixels.empty()) {  // rays whose hits do not fit are followed in the next batch
       const ImageRays::Piece piece = imageRays_.through(pixels);
-      pixels = pixels.subspan(size_t{2} * marker_.mark({piece.rays, piece.origins, piece.directions, {}}, 1));
+      pixels = pixels.subspan(size_t{2} * follower_.follow({piece.rays, piece.origins, piece.directions, {}}, 1));
     }
   }
 
  private:
   MeshModel& model_;
-  FaceMarker& marker_;
+  RayFollower& follower_;
   ImageRays imageRays_;
 };
 
 // Follows parallel rays through the region of interest, [-1,1]³, on a square lattice with the given spacing.
-void markParallel(Device& device, FaceMarker& marker, const Vec3d& direction, double spacing) {
+void markParallel(Device& device, RayFollower& follower, const Vec3d& direction, double spacing) {
   const Vec3d right = std::abs(direction.z()) > 0.9 ? Vec3d::UnitX() : direction.cross(Vec3d::UnitZ()).normalized();
   const Vec3d up = right.cross(direction);
   const double reach = std::sqrt(3.0);  // of the region, from its centre
@@ -48,7 +48,7 @@ void markParallel(Device& device, FaceMarker& marker, const Vec3d& direction, do
     while (!from.empty()) {
       const Array<float> o = device.uploadArray(std::vector<float>(from.begin(), from.end())),
                          d = device.uploadArray(std::vector<float>(along.begin(), along.end()));
-      const uint32_t followed = marker.mark({static_cast<uint32_t>(from.size() / 3), o, d, {}}, kParallelWeight);
+      const uint32_t followed = follower.follow({static_cast<uint32_t>(from.size() / 3), o, d, {}}, kParallelWeight);
       from = from.subspan(size_t{3} * followed);
       along = along.subspan(size_t{3} * followed);
     }
@@ -62,7 +62,7 @@ void markParallel(Device& device, FaceMarker& marker, const Vec3d& direction, do
         origins.push_back(static_cast<float>(origin[axis]));
         directions.push_back(static_cast<float>(direction[axis]));
       }
-      if (origins.size() == size_t{3} * FaceMarker::kMaxRays) follow();
+      if (origins.size() == size_t{3} * RayFollower::kMaxRays) follow();
     }
   }
   follow();
@@ -82,7 +82,7 @@ FaceMarker::FaceMarker(MeshModel& model, uint32_t level, const ExtractionSetting
   model.field().reserve(kExtractionSamples);
 }
 
-uint32_t FaceMarker::mark(const MeshRays& rays, float weight) {
+uint32_t FaceMarker::follow(const MeshRays& rays, float weight) {
   constexpr uint32_t kMaxHits = 1024;  // of a ray
   Device& device = model_.device();
   model_.level(level_).trace(rays, kMaxHits, false, hits_);
@@ -107,11 +107,11 @@ uint32_t FaceMarker::mark(const MeshRays& rays, float weight) {
   return followed;
 }
 
-FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
-                     const ExtractionSettings& settings, const std::function<void(int64_t, int64_t)>& onPhoto) {
-  FaceMarker marker(model, level, settings);
-  PhotoFaces faces(model, marker);
-  PhotoVisitor visitor(capture, model.frame(), FaceMarker::kMaxRays, faces);
+void followRays(MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
+                const ExtractionSettings& settings, RayFollower& follower,
+                const std::function<void(int64_t, int64_t)>& onPhoto) {
+  PhotoFaces faces(model, follower);
+  PhotoVisitor visitor(capture, model.frame(), RayFollower::kMaxRays, faces);
   if (tiles == nullptr) {
     visitor.visitAll(settings.photoStride, {}, onPhoto);
   } else {
@@ -132,18 +132,24 @@ FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, c
   }
   if (settings.raysPerCell > 0) {
     const double spacing = 2.0 / model.level(level).domain().grids[0].resolution / settings.raysPerCell;
-    markParallel(model.device(), marker, -Vec3d::UnitZ(), spacing);
+    markParallel(model.device(), follower, -Vec3d::UnitZ(), spacing);
     for (const double degrees : kElevations) {
       const double elevation = degrees * std::numbers::pi / 180;
       for (uint32_t k = 0; k < kAzimuths; ++k) {
         const double azimuth = 2 * std::numbers::pi * k / kAzimuths;
         markParallel(
-            model.device(), marker,
+            model.device(), follower,
             {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth), -std::sin(elevation)},
             spacing);
       }
     }
   }
+}
+
+FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
+                     const ExtractionSettings& settings, const std::function<void(int64_t, int64_t)>& onPhoto) {
+  FaceMarker marker(model, level, settings);
+  followRays(model, level, capture, tiles, settings, marker, onPhoto);
   FaceSet faceSet = marker.faces();
   faceSet.dropLeast(settings.droppedShare);
   return faceSet;

@@ -20,16 +20,23 @@ struct ExtractionSettings {
   double raysPerCell = 2;  // along an edge of a cell
 };
 
+// What looks at the rays of photos, and at parallel ones.
+class RayFollower {
+ public:
+  virtual ~RayFollower() = default;
+  static constexpr uint32_t kMaxRays = 4096;
+  // Follows the first rays of at most kMaxRays, as many as fit the buffers; returns their number, at least 1.
+  // `weight`: of the rays' directions for the faces that they see.
+  virtual uint32_t follow(const MeshRays& rays, float weight) = 0;
+};
+
 // Marks the faces that rays see.
-class FaceMarker {
+class FaceMarker final : public RayFollower {
  public:
   // Keeps a reference to `model`.
   FaceMarker(MeshModel& model, uint32_t level, const ExtractionSettings& settings);
 
-  static constexpr uint32_t kMaxRays = 4096;
-  // Follows the first rays of at most kMaxRays, as many as fit the buffers; returns their number, at least 1.
-  // `weight`: of the rays' directions for the faces that they see.
-  uint32_t mark(const MeshRays& rays, float weight);
+  uint32_t follow(const MeshRays& rays, float weight) override;
   const FaceSet& faces() const { return faces_; }
 
  private:
@@ -41,6 +48,11 @@ class FaceMarker {
   Array<uint32_t> counters_;
   Array<float> logits_;
 };
+
+// Follows the rays of the training photos, and parallel ones with distances that suit the cells of a level.
+void followRays(MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
+                const ExtractionSettings& settings, RayFollower& follower,
+                const std::function<void(int64_t done, int64_t all)>& onPhoto);
 
 // Returns the faces of a level of a block that the training photos of `capture` and parallel rays see. `tiles`:
 // [photo], the parts of the photos that are looked through; whole photos if it is null. Throws Error if a mask cannot

@@ -125,7 +125,7 @@ Matrix<const float> MeshField::decode(Count hits, Slice<const float> directions,
   return Matrix<float>(colours_, 3);
 }
 
-Matrix<const float> MeshField::decodeBackward(Count hits, Matrix<const float> colourGradients) {
+Matrix<const float> MeshField::decodeBackward(Count hits, Matrix<const float> colourGradients, bool trains) {
   const uint32_t inputs = static_cast<uint32_t>(shape_.decoder.inputs);
   const Matrix<float> inputGradients(decoderInputGradients_, inputs);
   device_.run(MlpBackward{shape_.decoder,
@@ -136,7 +136,7 @@ Matrix<const float> MeshField::decodeBackward(Count hits, Matrix<const float> co
                           decoderActivations_,
                           colourGradients,
                           {},
-                          decoder_.gradients,
+                          trains ? decoder_.gradients.all() : Slice<float>(),
                           inputGradients});
   return inputGradients.columnRange(0, kFeatures);
 }

@@ -49,13 +49,14 @@ class MeshField {
   // The two networks apart, for texels that the encoder is evaluated at and hits that the decoder is evaluated at.
   // `encodeForBackward` sets encodedFeatures(), [capacity][kFeatures]. Write decoderFeatures() before `decode`, which
   // returns the colours. The backward functions add to the gradients of the parameter groups; `decodeBackward` returns
-  // those of decoderFeatures(). All are valid until the next call of another function.
+  // those of decoderFeatures(), and does so alone unless it `trains` the decoder. All are valid until the next call of
+  // another function.
   void encodeForBackward(Count texels, Slice<const float> positions);
   Matrix<float> encodedFeatures() { return Matrix<float>(texelFeatures_, kFeatures); }
   void encodeBackward(Count texels, Slice<const float> positions, Matrix<const float> featureGradients);
   Matrix<float> decoderFeatures() { return features(); }
   Matrix<const float> decode(Count hits, Slice<const float> directions, Slice<const uint32_t> rayOfHit);
-  Matrix<const float> decodeBackward(Count hits, Matrix<const float> colourGradients);
+  Matrix<const float> decodeBackward(Count hits, Matrix<const float> colourGradients, bool trains);
 
   ParameterGroup& table() { return table_; }
   ParameterGroup& encoder() { return encoder_; }

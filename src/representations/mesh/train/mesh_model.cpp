@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "representations/mesh/train/texel_atlas.h"
 
 namespace tessera {
 namespace {
@@ -16,8 +17,40 @@ bool isSet(const std::vector<uint32_t>& bits, size_t i) {
   return (bits[i / 32] >> i % 32 & 1) != 0;
 }
 
+[[noreturn]] void throwOtherSettings(const fs::path& path, const std::string& prefix) {
+  throw Error(path.string(), "tensors " + prefix + "*", "do not belong to these settings",
+              "restore the config.toml that the checkpoint was trained with, or train again");
+}
+
 size_t countDisplacements(const OctahedraDomain& domain) {
   return size_t{3} * domain.grids[0].cells() * domain.grids.size();
+}
+
+// Adds the numbers of the faces, and the directions in which they are seen.
+void saveFaces(TensorSet& tensors, const std::string& prefix, const FaceSet& faces) {
+  const std::vector<uint32_t> numbers = faces.numbers();
+  std::vector<float> directions;
+  for (const uint32_t face : numbers) {
+    const Vec3f direction = faces.direction(face);
+    directions.insert(directions.end(), direction.begin(), direction.end());
+  }
+  tensors.add(prefix + "faces", numbers);
+  tensors.add(prefix + "directions", directions);
+}
+
+FaceSet restoreFaces(const fs::path& path, const Safetensors& file, const std::string& prefix,
+                     const OctahedraDomain& domain) {
+  const auto numbers = file.require(path, prefix + "faces", TensorType::u32).as<uint32_t>();
+  const auto directions = file.require(path, prefix + "directions", TensorType::f32).as<float>();
+  const uint64_t all = uint64_t{kFacesPerCell} * domain.grids[0].cells() * domain.grids.size();
+  if (directions.size() != 3 * numbers.size() || !std::all_of(numbers.begin(), numbers.end(), [&](uint32_t face) {
+        return face < all && faceExists(domain.grids, face);
+      }))
+    throwOtherSettings(path, prefix);
+  FaceSet faces(domain.grids);
+  for (size_t i = 0; i < numbers.size(); ++i)
+    faces.add(numbers[i], Vec3f(directions[3 * i], directions[3 * i + 1], directions[3 * i + 2]));
+  return faces;
 }
 
 }  // namespace
@@ -122,16 +155,13 @@ void MeshModel::save(TensorSet& tensors, bool withMoments) {
   for (const ParameterGroup* group : sharedGroups()) tensors.add(device_, *group, withMoments);
   for (const auto& level : levels_) level->save(tensors, withMoments);
   if (!atlas_) return;
-  const std::vector<uint32_t> faces = atlas_->faces.numbers();
-  std::vector<float> directions;
-  for (const uint32_t face : faces) {
-    const Vec3f direction = atlas_->faces.direction(face);
-    directions.insert(directions.end(), direction.begin(), direction.end());
-  }
   tensors.add("atlas.patch_edge", std::vector<uint32_t>{atlas_->patchEdge});
-  tensors.add("atlas.faces", faces);
-  tensors.add("atlas.directions", directions);
   tensors.add("atlas.ranges", atlas_->ranges);
+  saveFaces(tensors, "atlas.", atlas_->faces);
+  for (uint32_t number = 1; coarseAtlas(number) != nullptr; ++number) {
+    saveFaces(tensors, MeshLevel::tensorPrefix(number) + "atlas.", coarseAtlas(number)->faces);
+    tensors.add(device_, coarseAtlas(number)->texels, withMoments);
+  }
 }
 
 void MeshModel::setAtlas(MeshAtlas atlas) {
@@ -142,33 +172,38 @@ void MeshModel::setAtlas(MeshAtlas atlas) {
 void MeshModel::removeAtlas() {
   atlas_.reset();
   level(0).removeLimit();
+  if (!coarse_.empty()) levels_.resize(1);
+  coarse_.clear();
+}
+
+void MeshModel::addCoarseAtlas(FaceSet faces, const std::vector<float>& texels) {
+  const uint32_t number = static_cast<uint32_t>(coarse_.size()) + 1;
+  level(number).limitToFaces(faces);
+  coarse_.push_back({std::move(faces), ParameterGroup(device_, MeshLevel::tensorPrefix(number) + "texels", texels)});
 }
 
 void MeshModel::restoreAtlas(const fs::path& path, const Safetensors& file) {
-  const auto read = [&](const char* name, TensorType type) { return file.require(path, name, type); };
-  const auto edge = read("atlas.patch_edge", TensorType::u32).as<uint32_t>();
-  const auto faces = read("atlas.faces", TensorType::u32).as<uint32_t>();
-  const auto directions = read("atlas.directions", TensorType::f32).as<float>();
-  const auto ranges = read("atlas.ranges", TensorType::f32).as<float>();
-  const OctahedraDomain& domain = level(0).domain();
-  const uint64_t all = uint64_t{kFacesPerCell} * domain.grids[0].cells() * domain.grids.size();
+  const auto edge = file.require(path, "atlas.patch_edge", TensorType::u32).as<uint32_t>();
+  const auto ranges = file.require(path, "atlas.ranges", TensorType::f32).as<float>();
   bool isValid = edge.size() == 1 && edge[0] == static_cast<uint32_t>(config_.patchTexels) &&
-                 directions.size() == 3 * faces.size() && ranges.size() == 2 * MeshField::kFeatures &&
-                 std::all_of(faces.begin(), faces.end(),
-                             [&](uint32_t face) { return face < all && faceExists(domain.grids, face); });
+                 ranges.size() == 2 * MeshField::kFeatures;
   for (size_t f = 0; isValid && f < ranges.size(); f += 2)
     isValid = std::isfinite(ranges[f]) && std::isfinite(ranges[f + 1]) && ranges[f] <= ranges[f + 1];
-  if (!isValid) {
-    throw Error(path.string(), "tensors atlas.*", "do not belong to these settings",
-                "restore the config.toml that the checkpoint was trained with, or train again");
-  }
+  if (!isValid) throwOtherSettings(path, "atlas.");
   MeshAtlas atlas;
   atlas.patchEdge = edge[0];
-  atlas.faces = FaceSet(domain.grids);
-  for (size_t i = 0; i < faces.size(); ++i)
-    atlas.faces.add(faces[i], Vec3f(directions[3 * i], directions[3 * i + 1], directions[3 * i + 2]));
+  atlas.faces = restoreFaces(path, file, "atlas.", level(0).domain());
   atlas.ranges.assign(ranges.begin(), ranges.end());
   setAtlas(std::move(atlas));
+  for (uint32_t number = 1; number < levels(); ++number) {
+    const std::string prefix = MeshLevel::tensorPrefix(number);
+    if (!file.tensors.contains(prefix + "atlas.faces")) break;
+    FaceSet faces = restoreFaces(path, file, prefix + "atlas.", level(number).domain());
+    // Faces and vertices determine the number of texels.
+    const uint32_t texels = TexelAtlas(*this, number, faces, atlas_->patchEdge).texels();
+    addCoarseAtlas(std::move(faces), std::vector<float>(size_t{MeshField::kFeatures} * std::max(1u, texels)));
+    loadGroup(device_, path, file, coarse_.back().texels);
+  }
 }
 
 void MeshModel::restore(const fs::path& path, const Safetensors& file) {

@@ -26,6 +26,12 @@ struct MeshAtlas {
   std::vector<float> ranges;  // of the features, [MeshField::kFeatures][2]
 };
 
+// The same of a coarser level, whose texels are parameters of their own, with the ranges of the finest level.
+struct CoarseAtlas {
+  FaceSet faces;
+  ParameterGroup texels;  // [texels of TexelAtlas][MeshField::kFeatures]
+};
+
 class MeshModel {
  public:
   // Has the finest level. Keeps a reference to `device`.
@@ -47,7 +53,14 @@ class MeshModel {
   const std::optional<MeshAtlas>& atlas() const { return atlas_; }
   void setAtlas(MeshAtlas atlas);
   void setAtlasRanges(std::vector<float> ranges) { atlas_->ranges = std::move(ranges); }
+  // Also removes the coarser levels, if they were fitted to it.
   void removeAtlas();
+  // Of a coarser level that was fitted; null if it was not, and for level 0.
+  CoarseAtlas* coarseAtlas(uint32_t level) {
+    return level > 0 && level <= coarse_.size() ? &coarse_[level - 1] : nullptr;
+  }
+  // Adds that of the next coarser level, whose rays hit these faces alone from then on. `texels`: their initial values.
+  void addCoarseAtlas(FaceSet faces, const std::vector<float>& texels);
 
   // The cube map of the sky behind the outside, CubeMapForward::texels.
   static constexpr uint32_t kSkyResolution = 64;
@@ -73,6 +86,7 @@ class MeshModel {
   ParameterGroup sky_;  // empty for a block
   std::vector<std::unique_ptr<MeshLevel>> levels_;
   std::optional<MeshAtlas> atlas_;
+  std::vector<CoarseAtlas> coarse_;  // of levels 1, 2, 3, 4
 };
 
 }  // namespace tessera

@@ -8,6 +8,7 @@
 #include "compute/composite.h"
 #include "compute/cube_map.h"
 #include "representations/mesh/train/extraction.h"
+#include "representations/mesh/train/level_fit.h"
 #include "representations/mesh/train/mesh_schedule.h"
 
 namespace tessera {
@@ -26,6 +27,8 @@ constexpr double kFinalVertexFactor = 0.01;
 // is evaluated once.
 constexpr uint32_t kSquareOfRays = 2;
 constexpr double kFinalStageRate = 0.3;  // of the learning rate, at the beginning of the final stage
+// Of the texels of coarser levels, at the beginning; and what remains of it at the end.
+constexpr double kTexelRate = 0.1, kFinalTexelFactor = 0.1;
 // With `--minutes`, the number of steps is known only after a quarter of the time: until then the rate must not depend
 // on it.
 constexpr double kConstantVertexFraction = 0.3;
@@ -72,6 +75,8 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
   for (Array<float>* perRay : {&opacity_, &opaqueOpacity_}) *perRay = device.array<float>(rays);
   for (Array<float>* perRay : {&colour_, &opaqueColour_, &skyColour_}) *perRay = device.array<float>(size_t{rays} * 3);
   losses_ = device.array<float>(levels * kLosses);
+  coarseLosses_ = device.array<float>(AtlasStage::kLosses);
+  coarseCounters_ = device.array<uint32_t>(AtlasStage::kCounters);
   for (Array<float>* perSample : {&sampleWeights_, &sampleSteps_, &weightGradients_, &logitGradients_})
     *perSample = device.array<float>(samples);
   for (Array<float>* perSample : {&sampleColourGradients_, &positionGradients_})
@@ -92,9 +97,9 @@ bool MeshTrainer::isFinalStage(int64_t step, int64_t plannedSteps) const {
 }
 
 void MeshTrainer::beginFinalStage() {
-  bool atlasIsNew = false;
-  if (!model_.atlas()) {
-    if (model_.levels() == 1)  // short trainings end before coarse levels begin
+  const bool isNew = !model_.atlas();
+  if (isNew) {
+    if (model_.levels() == 1)  // short trainings end before coarse levels are trained
       model_.addCoarseLevels(mix64(static_cast<uint64_t>(config_.seed)));
     ExtractionSettings extraction;
     if (model_.part().isBackground()) {
@@ -109,27 +114,45 @@ void MeshTrainer::beginFinalStage() {
     if (atlas.faces.count() == 0) warn("{}: no triangle is opaque enough to be kept", model_.part().name);
     atlas.ranges.resize(2 * MeshField::kFeatures);  // they are found below
     model_.setAtlas(std::move(atlas));
-    atlasIsNew = true;
   }
-  TexelAtlas texels(model_, model_.atlas()->faces, model_.atlas()->patchEdge);
-  if (atlasIsNew) model_.setAtlasRanges(texels.findRanges(model_));
+  TexelAtlas texels(model_, 0, model_.atlas()->faces, model_.atlas()->patchEdge);
+  if (isNew) model_.setAtlasRanges(texels.findRanges(model_));
   constexpr uint32_t kTexelsPerHit = 4, kLeastHits = 256;
-  const uint32_t samples = static_cast<uint32_t>(config_.samplesPerStep);
-  finalStage_.emplace(model_, std::move(texels), static_cast<uint32_t>(config_.maxRays),
-                      std::max(kLeastHits, kCapacityPerDemand * samples / kTexelsPerHit));
+  const uint32_t samples = static_cast<uint32_t>(config_.samplesPerStep),
+                 maxRays = static_cast<uint32_t>(config_.maxRays);
+  const uint32_t hits = std::max(kLeastHits, kCapacityPerDemand * samples / kTexelsPerHit);
+  finalStage_.push_back(std::make_unique<AtlasStage>(model_, 0, std::move(texels), maxRays, hits));
+  for (uint32_t level = 1; config_.fitsLevels() && level < model_.levels(); ++level) {
+    if (model_.coarseAtlas(level) == nullptr) fitCoarseLevel(level);
+    TexelAtlas coarse(model_, level, model_.coarseAtlas(level)->faces, model_.atlas()->patchEdge);
+    finalStage_.push_back(std::make_unique<AtlasStage>(model_, level, std::move(coarse), maxRays, hits));
+  }
+}
+
+void MeshTrainer::fitCoarseLevel(uint32_t level) {
+  constexpr int kRaysAcrossTexels = 2;  // of those that find faces
+  constexpr double kDroppedShare = 0.01;
+  ExtractionSettings extraction;
+  extraction.photoStride = std::max(1, findPhotoStride(pixelWidth_, model_.level(level).domain()) / kRaysAcrossTexels);
+  extraction.raysPerCell *= kRaysAcrossTexels;
+  extraction.droppedShare = kDroppedShare;
+  FittedLevel fitted = fitLevel(model_, level, capture_, &tiles_, extraction);
+  model_.addCoarseAtlas(std::move(fitted.faces), fitted.texels);
 }
 
 // Its rate falls, over the final stage, from kFinalStageRate to the final factor of the rate of all steps.
 StepReport MeshTrainer::finalStep(int64_t step, int64_t plannedSteps) {
-  if (!finalStage_) beginFinalStage();
+  if (finalStage_.empty()) beginFinalStage();
   photoRays_.draw(step, budget_.rays(), kSquareOfRays);
   const Slice<uint32_t> counters = counters_.part(counters_.size() - AtlasStage::kCounters, AtlasStage::kCounters);
-  finalStage_->addGradients(photoRays_, photoLoss_, losses_.part(0, AtlasStage::kLosses), counters);
+  finalStage_[0]->addGradients(photoRays_, photoRays_.count(), photoLoss_, losses_.part(0, AtlasStage::kLosses),
+                               counters);
   const int64_t first = config_.stepsBeforeFinalStage(plannedSteps);
   const double done =
       static_cast<double>(step - first) / static_cast<double>(std::max<int64_t>(1, plannedSteps - first));
   updateNetworks(config_.learningRate * kFinalStageRate *
                  std::pow(config_.finalLearningRateFactor / kFinalStageRate, done));
+  updateCoarseTexels(done);
 
   const auto [counts, losses] = device_.readAll(counters, losses_.part(0, AtlasStage::kLosses));
   StepReport report;
@@ -147,15 +170,26 @@ StepReport MeshTrainer::finalStep(int64_t step, int64_t plannedSteps) {
   return report;
 }
 
+void MeshTrainer::updateCoarseTexels(double done) {
+  for (uint32_t level = 1; level < finalStage_.size(); ++level) {
+    const uint32_t rays = std::max(1u, photoRays_.count() >> (level - 1));
+    finalStage_[level]->addGradients(photoRays_, rays, photoLoss_, coarseLosses_, coarseCounters_);
+    Adam adam;
+    adam.rate = static_cast<float>(kTexelRate * std::pow(kFinalTexelFactor, done));
+    adam.skipZeroGradients = true;
+    model_.coarseAtlas(level)->texels.step(device_, adam);
+  }
+}
+
 StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
   if (isFinalStage(step, plannedSteps)) return finalStep(step, plannedSteps);
   plannedSteps = config_.stepsBeforeFinalStage(plannedSteps);
   if (model_.atlas()) {  // the training goes on beyond its former end
     model_.removeAtlas();
-    finalStage_.reset();
+    finalStage_.clear();
   }
   refreshOccupancy(step);
-  if (MeshSchedule::period(step, plannedSteps) > 0 && model_.levels() == 1)
+  if (!config_.fitsLevels() && MeshSchedule::period(step, plannedSteps) > 0 && model_.levels() == 1)
     model_.addCoarseLevels(mix64(static_cast<uint64_t>(config_.seed)));
   const uint32_t rays = budget_.rays();
   photoRays_.draw(step, rays);

@@ -30,6 +30,9 @@ class MeshTrainer final : public TrainableModel {
   // The final stage: its atlas is made before its first step.
   bool isFinalStage(int64_t step, int64_t plannedSteps) const;
   void beginFinalStage();
+  void fitCoarseLevel(uint32_t level);
+  // Trains the texels of coarser levels on the rays of the step. done: share of the final stage.
+  void updateCoarseTexels(double done);
   StepReport finalStep(int64_t step, int64_t plannedSteps);
   void refreshOccupancy(int64_t step);
   // Adds the gradients of a level of detail: of the networks and the vertices for the finest, of the vertices alone for
@@ -59,12 +62,13 @@ class MeshTrainer final : public TrainableModel {
   RayBudget budget_;
   MeshHits hits_;
   Array<uint32_t> counters_;
-  Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, skyColour_, losses_;
+  Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, skyColour_, losses_, coarseLosses_;
+  Array<uint32_t> coarseCounters_;
   Array<float> sampleWeights_, sampleSteps_, weightGradients_, logitGradients_, sampleColourGradients_,
       positionGradients_;
-  std::vector<TileShares> tiles_;  // [photo]
-  double pixelWidth_ = 0;          // MeshStart::pixelWidth
-  std::optional<AtlasStage> finalStage_;
+  std::vector<TileShares> tiles_;                        // [photo]
+  double pixelWidth_ = 0;                                // MeshStart::pixelWidth
+  std::vector<std::unique_ptr<AtlasStage>> finalStage_;  // of each level
 };
 
 }  // namespace tessera

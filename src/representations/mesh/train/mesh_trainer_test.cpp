@@ -77,6 +77,7 @@ TEST(MeshTrainer, TrainsCoarseLevelsThatChangeNothingElse) {
   MeshConfig config = smallMeshConfig(), alone = config;
   config.meshCells = alone.meshCells = 32;
   config.meshLevels = 3;
+  config.fittedLevels = false;
   alone.meshLevels = 1;
   constexpr int64_t kSteps = 400;
   CubeTraining trained(scene, config, kSteps), single(scene, alone, kSteps);
@@ -177,6 +178,7 @@ TEST(MeshTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
     state = part.trainer->save(0);
   }
   EXPECT_EQ(state, unbroken.trainer->save(0));
+  EXPECT_NE(unbroken.trainer->model().coarseAtlas(1), nullptr) << "levels were fitted and stored, too";
 }
 
 TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {

@@ -31,9 +31,10 @@ float sceneFactor(const OctahedraGrid& grid, const Vec3d& point) {
 
 }  // namespace
 
-TexelAtlas::TexelAtlas(MeshModel& model, const FaceSet& faces, uint32_t patchEdge) : patchEdge_(patchEdge) {
-  const OctahedraDomain& domain = model.level(0).domain();
-  const std::vector<float> displacements = model.device().read(model.level(0).displacements().values.all());
+TexelAtlas::TexelAtlas(MeshModel& model, uint32_t level, const FaceSet& faces, uint32_t patchEdge)
+    : patchEdge_(patchEdge) {
+  const OctahedraDomain& domain = model.level(level).domain();
+  const std::vector<float> displacements = model.device().read(model.level(level).displacements().values.all());
   const TriangleList own = listTriangles(domain.grids, domain.ownGrids, displacements, faces.bits());
   FaceSet others(domain.grids);
   for (const uint32_t face : faces.numbers()) others.add(face);
@@ -83,6 +84,22 @@ void TexelAtlas::addPatch(const OctahedraDomain& domain, const TriangleList& lis
     throw Error(fmt::format("--set patch_texels={}", patchEdge_), "", "the part has more texels than fit the memory",
                 "use a lower number, or a lower --set mesh_cells");
   }
+}
+
+std::vector<float> TexelAtlas::encodeTexels(MeshModel& model) const {
+  constexpr uint32_t kFeatures = MeshField::kFeatures;
+  Device& device = model.device();
+  model.field().reserve(kTexelsAtATime);
+  Array<float> features = device.array<float>(size_t{kFeatures} * kTexelsAtATime);
+  std::vector<float> all;
+  for (uint32_t first = 0; first < texels_; first += kTexelsAtATime) {
+    const uint32_t count = std::min(kTexelsAtATime, texels_ - first);
+    model.field().encode({count}, positions_.part(size_t{3} * first, size_t{3} * count),
+                         Matrix<float>(features, kFeatures));
+    const std::vector<float> some = device.read(features.part(0, size_t{kFeatures} * count));
+    all.insert(all.end(), some.begin(), some.end());
+  }
+  return all;
 }
 
 std::vector<float> TexelAtlas::findRanges(MeshModel& model) const {

@@ -9,9 +9,9 @@ namespace tessera {
 
 class TexelAtlas {
  public:
-  // The vertices of the finest level must not move from now on. `faces`: of the finest level, also
-  // those in the margin of a block, which contents do not hold but rays beside its walls need.
-  TexelAtlas(MeshModel& model, const FaceSet& faces, uint32_t patchEdge);
+  // The vertices of the level must not move from now on. `faces`: of the level, also those in the margin of a block,
+  // which contents do not hold but rays beside its walls need.
+  TexelAtlas(MeshModel& model, uint32_t level, const FaceSet& faces, uint32_t patchEdge);
 
   uint32_t patchEdge() const { return patchEdge_; }
   uint32_t texels() const { return texels_; }
@@ -19,6 +19,8 @@ class TexelAtlas {
   Slice<const float> cornerFactors() const { return cornerFactors_.all(); }  // PatchTexels::cornerFactors
   Matrix<const float> positions() const { return Matrix<const float>(positions_.all(), 3); }  // in the field
 
+  // Returns the encoder's output at all texels, [texels][kFeatures].
+  std::vector<float> encodeTexels(MeshModel& model) const;
   // Returns the ranges of the features of all visible texels, [kFeatures][2].
   std::vector<float> findRanges(MeshModel& model) const;
 

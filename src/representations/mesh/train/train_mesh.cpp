@@ -6,7 +6,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <optional>
 
 #include "base/error.h"
 #include "base/log.h"
