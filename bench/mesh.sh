@@ -6,6 +6,8 @@
 #   city         a city of 2x2 blocks, 15 minutes with coarse field and final stage: held-out PSNR of the baked scene and of its
 #                levels, beside `field` in the same time; bytes, triangles and time of baking; its contents as glTF files; the bytes
 #                of a block with stored and with inferred maps
+#   levels       that scene's coarser levels in views whose pixels match their texels: photos of half the size for level 1, of a
+#                quarter for level 2, against the next finer level in the same views; triangles relative to the next finer level
 #   final        one block of the city with and without the final stage, in the same time, three seeds; the whole city likewise,
 #                once; what each step from its model to contents loses, and what opacities of 0 and 1 alone would
 #   holes        200 fresh views of that city from other heights: the share of pixels in which the scene's blocks have a hole, at the
@@ -28,7 +30,7 @@
 #                photogrammetric mesh
 #   fox, beach   real photographs, 10 minutes each: held-out PSNR of the baked scene
 # Resumable: everything is kept in build/bench/mesh, and what exists is not made again; remove traversal-* there to repeat a row.
-#   [ROWS="traversal city final …"] [SEEDS="1 2 3"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
+#   [ROWS="traversal city levels …"] [SEEDS="1 2 3"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
 # CAPTURE: the capture of MODEL, if it is not where its blocks.json says.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -369,6 +371,29 @@ vulkan() {
     "$(difference "$(jq .psnr "$work/vulkan-cpu.json")" "$(jq .psnr "$work/vulkan-vulkan.json")")" '<=' 0.2
 }
 
+levels() {
+  need_tessera
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  local level size finer coarser
+  for level in 1 2; do
+    size=$((400 >> level))x$((300 >> level))
+    [ -e "$work/city-$size/transforms.json" ] || "$tessera" synth city "$work/city-$size" --blocks 2x2 --size "$size"
+    for lod in $((level - 1)) "$level"; do
+      [ -s "$work/city-$size-lod$lod.json" ] || "$tessera" eval "$work/city-mesh.scene" "$work/city-$size" --lod "$lod" \
+        --json "$work/city-$size-lod$lod.json" ${lpips:+--lpips "$lpips"} > /dev/null
+    done
+    finer=$work/city-$size-lod$((level - 1)).json coarser=$work/city-$size-lod$level.json
+    jq -r --arg level "$level" --slurpfile finer "$finer" '"level \($level) of matching pixels: PSNR \(.psnr) after " +
+      "\($finer[0].psnr), SSIM \(.ssim) after \($finer[0].ssim), LPIPS \(.lpips) after \($finer[0].lpips)"' "$coarser"
+    verdict "level $level, loss against the next finer level in dB" \
+      "$(shortfall "$(jq .psnr "$finer")" "$(jq .psnr "$coarser")")" '<=' 1.5
+    verdict "level $level, triangles relative to the next finer level" \
+      "$(jq --argjson l "$level" '.levels[$l].triangles / .levels[$l - 1].triangles' "$work/city-mesh.bake.json")" '<=' 0.3
+  done
+}
+
 holes() {
   need_tessera
   local program=build/release/bench/mesh_holes error
@@ -458,7 +483,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city final holes losses quads depth borders processes killed vulkan fallback yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses quads depth borders processes killed vulkan fallback yardstick fox beach}; do
   "$row"
 done
 finish

@@ -189,6 +189,7 @@ class MeshBaker final : public Baker {
     extraction.photoStride = options_.stride << sceneLevel;
     // Triangles of coarse levels are few, and holes in them are large.
     if (level == 0) extraction.droppedShare = model.config().droppedShare;
+    extraction.dilation = model.config().dilation;
     if (model.part().isBackground()) extraction.raysPerCell = 0;
     const FaceSet faces = extractFaces(model, level, capture, nullptr, extraction, [this](int64_t done, int64_t) {
       options_.onPhoto(passesDone_ * photosToCome_ + done, passes_ * photosToCome_);

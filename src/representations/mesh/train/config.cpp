@@ -74,6 +74,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       finalShareSetting(),
       fittedLevelsSetting(),
       droppedShareSetting(),
+      dilationSetting(),
       patchTexelsSetting(),
       distortionWeightSetting(),
       depthWeightSetting(),

@@ -80,6 +80,9 @@ struct MeshConfig : BackgroundBlockSettings,
           "of what all triangles contribute to the rays of photos and those from above: the triangles with the least, "
           "which have this share together, are dropped",
           within(0, 0.5));
+  SETTING(int, dilation, 0, "dilation",
+          "how often the triangles beside those that rays see are added, if they are opaque enough, to close holes",
+          within(0, 4));
   SETTING(int, patchTexels, 8, "patch_texels", "texels along the edge of a patch of two triangles",
           within(8, 32).withDivisor(4, 0));
 

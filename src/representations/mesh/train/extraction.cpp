@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "representations/mesh/content/patch_texels.h"
 #include "train/photo_visitor.h"
 
 namespace tessera {
@@ -66,6 +67,83 @@ void markParallel(Device& device, RayFollower& follower, const Vec3d& direction,
     }
   }
   follow();
+}
+
+// Counts the rays that stay mostly transparent.
+class HoleCounter final : public RayFollower {
+ public:
+  explicit HoleCounter(MeshModel& model)
+      : model_(model),
+        hits_(model.device(), kMaxRays, kExtractionSamples),
+        counters_(model.device().array<uint32_t>(MeshHits::kCounters)),
+        logits_(model.device().array<float>(kExtractionSamples)) {
+    hits_.counters = counters_;
+    model.field().reserve(kExtractionSamples);
+  }
+
+  uint32_t follow(const MeshRays& rays, float) override {
+    constexpr uint32_t kMaxHits = 1024;  // of a ray
+    Device& device = model_.device();
+    model_.level(0).trace(rays, kMaxHits, false, hits_);
+    model_.field().encode(hits_.samples(), hits_.positions, Matrix<float>(logits_, 1));
+    const std::vector<uint32_t> counters = device.read(counters_.all());
+    const uint32_t followed = counters[1];
+    CHECK(followed >= 1u);  // one ray's hits always fit
+    const auto [first, logits] = device.readAll(Slice<const uint32_t>(hits_.firstSample.part(0, followed + size_t{1})),
+                                                Slice<const float>(logits_.part(0, counters[0])));
+    for (uint32_t ray = 0; ray < followed; ++ray) {
+      float transmittance = 1;
+      for (uint32_t i = first[ray]; i < first[ray + 1]; ++i)
+        transmittance *= 1 - storedOpacity(1 / (1 + std::exp(-logits[i] - model_.opacityOffset())),
+                                           StoredOpacity::kOpaqueFrom, StoredOpacity::kTransparentBelow);
+      ++coverage_.pixels;
+      coverage_.holes += transmittance > 0.5f ? 1 : 0;
+    }
+    return followed;
+  }
+  const Coverage& coverage() const { return coverage_; }
+
+ private:
+  MeshModel& model_;
+  MeshHits hits_;
+  Array<uint32_t> counters_;
+  Array<float> logits_;
+  Coverage coverage_;
+};
+
+// Adds the neighbours of the faces that are opaque enough in their middle.
+void addNeighbours(MeshModel& model, uint32_t level, float minOpacity, FaceSet& faces) {
+  Device& device = model.device();
+  const OctahedraDomain& domain = model.level(level).domain();
+  const std::vector<float> displacements = device.read(model.level(level).displacements().values.all());
+  const uint32_t n = domain.grids[0].resolution, cells = domain.grids[0].cells();
+  const std::vector<uint32_t> neighbours = faces.neighbours(domain.grids).numbers();
+  Array<float> positions = device.array<float>(size_t{3} * kExtractionSamples),
+               logits = device.array<float>(kExtractionSamples);
+  model.field().reserve(kExtractionSamples);
+  for (size_t begin = 0; begin < neighbours.size(); begin += kExtractionSamples) {
+    const auto some =
+        std::span(neighbours).subspan(begin, std::min<size_t>(kExtractionSamples, neighbours.size() - begin));
+    std::vector<float> middles(size_t{3} * kExtractionSamples);
+    for (size_t i = 0; i < some.size(); ++i) {
+      const OctahedraGrid& grid = domain.grids[some[i] / kFacesPerCell / cells];
+      for (const auto& corner : octahedronFace(some[i] % kFacesPerCell)) {
+        const int64_t step = corner[0] + int64_t{n} * (corner[1] + int64_t{n} * corner[2]);
+        const size_t vertex = static_cast<size_t>(int64_t{some[i] / kFacesPerCell} + step);
+        const size_t cell = vertex % cells;
+        const size_t place[3] = {cell % n, cell / n % n, cell / (size_t{n} * n)};
+        for (size_t axis = 0; axis < 3; ++axis)
+          middles[3 * i + axis] +=
+              (static_cast<float>(place[axis]) + 0.5f + displacements[3 * vertex + axis] + grid.positionOffset[axis]) *
+              grid.positionScale() / 3;
+      }
+    }
+    device.write(positions.all(), std::span<const float>(middles));
+    model.field().encode({static_cast<uint32_t>(some.size())}, positions, Matrix<float>(logits, 1));
+    const std::vector<float> values = device.read(logits.part(0, some.size()));
+    for (size_t i = 0; i < some.size(); ++i)
+      if (1 / (1 + std::exp(-values[i] - model.opacityOffset())) >= minOpacity) faces.add(some[i]);
+  }
 }
 
 }  // namespace
@@ -146,12 +224,30 @@ void followRays(MeshModel& model, uint32_t level, const Capture& capture, const 
   }
 }
 
+Coverage checkCoverage(MeshModel& model, const Capture& capture, const std::vector<TileShares>& tiles) {
+  HoleCounter counter(model);
+  PhotoFaces middles(model, counter);
+  PhotoVisitor visitor(capture, model.frame(), RayFollower::kMaxRays, middles);
+  for (const int photo : capture.photosIn(Split::train)) {
+    std::vector<PixelLattice> lattices;
+    for (const PhotoTile& tile : tiles[photo].tiles) {
+      const int x = static_cast<int>(tile.left + tile.right) / 2, y = static_cast<int>(tile.top + tile.bottom) / 2;
+      lattices.push_back({x, y, x + 1, y + 1, 1});
+    }
+    if (lattices.empty()) continue;
+    visitor.begin(photo);
+    visitor.look(lattices, SeenThrough::photo, false);
+  }
+  return counter.coverage();
+}
+
 FaceSet extractFaces(MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
                      const ExtractionSettings& settings, const std::function<void(int64_t, int64_t)>& onPhoto) {
   FaceMarker marker(model, level, settings);
   followRays(model, level, capture, tiles, settings, marker, onPhoto);
   FaceSet faceSet = marker.faces();
   faceSet.dropLeast(settings.droppedShare);
+  for (int i = 0; i < settings.dilation; ++i) addNeighbours(model, level, settings.minOpacity, faceSet);
   return faceSet;
 }
 

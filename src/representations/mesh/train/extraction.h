@@ -16,6 +16,9 @@ struct ExtractionSettings {
   float maxOpacity = 0.8f;  // accumulated opacity beyond which a ray sees no further face
   int photoStride = 1;      // every photoStride-th pixel of a photo, along both axes
   double droppedShare = 0;  // of all contributions: the faces with the least are dropped
+  // How often the faces that share an edge with the others, and whose middle has at least minOpacity, are added: they
+  // close holes in views that differ from those of the rays.
+  int dilation = 0;
   // Parallel rays: straight down, and from 8 directions each at 60°, 45° and 30° above the horizon; none with 0.
   double raysPerCell = 2;  // along an edge of a cell
 };
@@ -53,6 +56,13 @@ class FaceMarker final : public RayFollower {
 void followRays(MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
                 const ExtractionSettings& settings, RayFollower& follower,
                 const std::function<void(int64_t done, int64_t all)>& onPhoto);
+
+// How well the faces of the finest level, if they are fixed (MeshModel::atlas), cover what photos show of a part.
+struct Coverage {
+  uint64_t pixels = 0, holes = 0;  // less than half opaque
+};
+// Looks at the middles of the tiles.
+Coverage checkCoverage(MeshModel& model, const Capture& capture, const std::vector<TileShares>& tiles);
 
 // Returns the faces of a level of a block that the training photos of `capture` and parallel rays see. `tiles`:
 // [photo], the parts of the photos that are looked through; whole photos if it is null. Throws Error if a mask cannot

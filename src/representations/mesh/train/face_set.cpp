@@ -1,7 +1,9 @@
 #include "representations/mesh/train/face_set.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <unordered_set>
 
 namespace tessera {
 
@@ -50,6 +52,40 @@ FaceSet FaceSet::quads(OctahedraGrids grids) {
     }
   }
   return quads;
+}
+
+FaceSet FaceSet::neighbours(OctahedraGrids grids) const {
+  const int n = static_cast<int>(grids[0].resolution);
+  const uint32_t cells = grids[0].cells();
+  // Calls use(edge) for the three edges of a face, pairs of the numbers of its vertices' cells in all grids.
+  const auto forEachEdge = [&](uint32_t face, const auto& use) {
+    std::array<uint64_t, 3> vertices{};
+    for (size_t i = 0; i < 3; ++i) {
+      const auto corner = octahedronFace(face % kFacesPerCell)[i];
+      vertices[i] = static_cast<uint64_t>(int64_t{face / kFacesPerCell} + corner[0] + n * (corner[1] + n * corner[2]));
+    }
+    for (size_t i = 0; i < 3; ++i) {
+      const auto [low, high] = std::minmax(vertices[i], vertices[(i + 1) % 3]);
+      use(low << 32 | high);
+    }
+  };
+  std::unordered_set<uint64_t> edges;
+  for (const uint32_t face : numbers()) forEachEdge(face, [&](uint64_t edge) { edges.insert(edge); });
+  FaceSet neighbours(grids);
+  for (uint32_t cell = 0; cell < cells * grids.size(); ++cell) {
+    const uint32_t at = cell % cells, resolution = grids[0].resolution;
+    if (!carriesOctahedron(grids[0].placement, at % resolution, at / resolution % resolution,
+                           at / (resolution * resolution)))
+      continue;
+    for (uint32_t local = 0; local < kFacesPerCell; ++local) {
+      const uint32_t face = kFacesPerCell * cell + local;
+      if (contains(face) || !faceExists(grids, face)) continue;
+      forEachEdge(face, [&](uint64_t edge) {
+        if (edges.contains(edge)) neighbours.add(face);
+      });
+    }
+  }
+  return neighbours;
 }
 
 size_t FaceSet::count() const {

@@ -31,6 +31,8 @@ class FaceSet {
   Vec3f direction(uint32_t face) const;
   // The numbers of the faces, in ascending order.
   std::vector<uint32_t> numbers() const;
+  // The faces that share an edge with one of these and are not among them.
+  FaceSet neighbours(OctahedraGrids grids) const;
   // The triangles of MobileNeRF's grid (Chen et al. 2023, section 3.1) among those of octahedra in all cells: for two
   // axes, the vertices of the cells c, c + a, c + b and c + a + b form a quad.
   static FaceSet quads(OctahedraGrids grids);

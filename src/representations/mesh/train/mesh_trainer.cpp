@@ -108,12 +108,18 @@ void MeshTrainer::beginFinalStage() {
       extraction.photoStride = findPhotoStride(pixelWidth_, model_.level(0).domain());
     }
     extraction.droppedShare = config_.droppedShare;
+    extraction.dilation = config_.dilation;
     MeshAtlas atlas;
     atlas.patchEdge = static_cast<uint32_t>(config_.patchTexels);
     atlas.faces = extractFaces(model_, 0, capture_, &tiles_, extraction);
     if (atlas.faces.count() == 0) warn("{}: no triangle is opaque enough to be kept", model_.part().name);
     atlas.ranges.resize(2 * MeshField::kFeatures);  // they are found below
     model_.setAtlas(std::move(atlas));
+    if (!model_.part().isBackground()) {
+      const Coverage coverage = checkCoverage(model_, capture_, tiles_);
+      inform("{}: {} triangles; {} of {} pixels that show a surface in it have a hole", model_.part().name,
+             model_.atlas()->faces.count(), coverage.holes, coverage.pixels);
+    }
   }
   TexelAtlas texels(model_, 0, model_.atlas()->faces, model_.atlas()->patchEdge);
   if (isNew) model_.setAtlasRanges(texels.findRanges(model_));

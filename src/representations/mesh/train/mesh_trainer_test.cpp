@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
 #include "representations/field/testing/trained_cube.h"
 #include "representations/mesh/testing/small_mesh.h"
@@ -121,6 +122,13 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
     EXPECT_LE(some.contains(face), most.contains(face)) << "rays were added";
     EXPECT_LE(most.contains(face), faces.contains(face)) << "rays were added";
   }
+  ExtractionSettings dilated = few;
+  dilated.dilation = 1;
+  const FaceSet wider = extractFaces(model, 0, scene.capture(), nullptr, dilated);
+  EXPECT_GT(wider.count(), some.count() * 11 / 10) << "triangles beside them that no ray sees";
+  EXPECT_LT(wider.count(), some.count() * 4);
+  const FaceSet beside = some.neighbours(model.level(0).domain().grids);
+  for (const uint32_t face : wider.numbers()) EXPECT_TRUE(some.contains(face) || beside.contains(face));
   model.level(0).keepFaces(faces.bits());
   const double withAll = heldOutPsnr(scene, model);
   EXPECT_GT(withAll, before - 1.5);
@@ -135,6 +143,57 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   EXPECT_LT(heldOutPsnr(scene, model), before - 3) << "without faces nothing is left";
   model.level(0).keepFaces({});
   EXPECT_EQ(heldOutPsnr(scene, model), before);
+}
+
+TEST(FaceSet, ListsTheFacesThatShareAnEdge) {
+  OctahedraGrid grid;
+  grid.resolution = 6;
+  const std::vector<OctahedraGrid> grids = {grid};
+  FaceSet set(grids);
+  const uint32_t cell = 2 + 6 * (3 + 6 * 3), face = kFacesPerCell * cell + kOuterFaces;  // an inner face
+  set.add(face);
+  const FaceSet neighbours = set.neighbours(grids);
+  EXPECT_FALSE(neighbours.contains(face));
+  std::set<std::array<int, 3>> corners;
+  for (const auto& corner : octahedronFace(kOuterFaces)) corners.insert(corner);
+  size_t ofTheSame = 0;
+  for (uint32_t local = 0; local < kFacesPerCell; ++local) {
+    size_t shared = 0;
+    for (const auto& corner : octahedronFace(local)) shared += corners.count(corner);
+    EXPECT_EQ(neighbours.contains(kFacesPerCell * cell + local), shared == 2) << local;
+    ofTheSame += shared == 2 ? 1 : 0;
+  }
+  EXPECT_GT(neighbours.count(), ofTheSame) << "those of other octahedra at the outer edge";
+  EXPECT_LT(neighbours.count(), 3u * kFacesPerCell);
+  EXPECT_EQ(FaceSet(grids).neighbours(grids).count(), 0u);
+}
+
+TEST(Extraction, CountsThePixelsThatFacesDoNotCover) {
+  const CubeScene scene;
+  MeshConfig config = smallMeshConfig();
+  config.finalShare = 0;
+  CubeTraining trained(scene, config, 400);
+  MeshModel& model = trained.trainer->model();
+  std::vector<TileShares> tiles(scene.capture().photos.size());
+  constexpr uint32_t kEdge = 4, kLeft = CubeScene::kWidth / 2 - 8, kTop = CubeScene::kHeight / 2 - 8;  // on the cube
+  uint64_t pixels = 0;
+  for (const int photo : scene.capture().photosIn(Split::train))
+    for (uint32_t i = 0; i < 16; ++i, ++pixels) {
+      const uint32_t left = kLeft + kEdge * (i % 4), top = kTop + kEdge * (i / 4);
+      tiles[photo].tiles.push_back({photo, left, top, left + kEdge, top + kEdge});
+      tiles[photo].until.push_back(tiles[photo].total() + kEdge * kEdge);
+    }
+  MeshAtlas atlas;
+  atlas.patchEdge = 8;
+  atlas.faces = extractFaces(model, 0, scene.capture(), nullptr, {});
+  model.setAtlas(atlas);
+  const Coverage all = checkCoverage(model, scene.capture(), tiles);
+  EXPECT_EQ(all.pixels, pixels);
+  EXPECT_LT(all.holes, pixels / 20);
+  model.removeAtlas();
+  atlas.faces = FaceSet(model.level(0).domain().grids);
+  model.setAtlas(std::move(atlas));
+  EXPECT_EQ(checkCoverage(model, scene.capture(), tiles).holes, pixels) << "nothing is left";
 }
 
 TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {
