@@ -4,6 +4,7 @@
 #include "representations/mesh/train/atlas_stage.h"
 #include "representations/mesh/train/mesh_model.h"
 #include "representations/mesh/train/mesh_start.h"
+#include "representations/mesh/train/through_rays.h"
 #include "train/photo_loss.h"
 #include "train/ray_budget.h"
 #include "train/training_loop.h"
@@ -47,6 +48,9 @@ class MeshTrainer final : public TrainableModel {
   // hits stand before the sky, and there is no second loss.
   void addVolumeLoss(const Batch& batch, double weight);
   void addOpaqueLoss(const Batch& batch, double weight, double threshold);
+  // Draws rays through the block, and adds the gradients of their loss, of the opacities alone, to the encoder and the
+  // table. Returns their number.
+  uint32_t addThroughGradients(int64_t step);
   void updateNetworks(double rate);
   void updateVertices(int64_t step, int64_t steps);
 
@@ -55,6 +59,8 @@ class MeshTrainer final : public TrainableModel {
   MeshConfig config_;
   MeshModel model_;
   PhotoRays photoRays_;
+  std::optional<ThroughRays> throughRays_;
+  double throughShare_ = 0;  // relative to the other rays
   PhotoLoss photoLoss_;
   RayBudget budget_;
   MeshHits hits_;
@@ -62,8 +68,9 @@ class MeshTrainer final : public TrainableModel {
   Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, skyColour_, losses_;
   Array<float> sampleWeights_, sampleSteps_, weightGradients_, logitGradients_, sampleColourGradients_,
       positionGradients_;
-  std::vector<TileShares> tiles_;  // [photo]
-  double pixelWidth_ = 0;          // MeshStart::pixelWidth
+  Array<float> rayOpacityGradients_, zeros_;  // for rays through the block
+  std::vector<TileShares> tiles_;             // [photo]
+  double pixelWidth_ = 0;                     // MeshStart::pixelWidth
   std::optional<AtlasStage> finalStage_;
 };
 
