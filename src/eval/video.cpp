@@ -1,49 +1,19 @@
 #include "eval/video.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
-#include <spawn.h>
-#include <sys/mman.h>
 #include <sys/socket.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <vector>
 
 #include "base/check.h"
+#include "base/child_process.h"
 #include "base/error.h"
-
-extern char** environ;
 
 namespace tessera {
 namespace {
-
-class Descriptor {
- public:
-  Descriptor() = default;
-  explicit Descriptor(int value) : value_(value) {}
-  ~Descriptor() { close(); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-
-  void reset(int value) {
-    close();
-    value_ = value;
-  }
-  void close() {
-    if (value_ >= 0) ::close(value_);
-    value_ = -1;
-  }
-  int get() const { return value_; }
-
- private:
-  int value_ = -1;
-};
 
 std::vector<std::string> argumentsFor(const VideoOptions& options, const fs::path& target) {
   return {options.program, "-nostdin", "-hide_banner", "-loglevel", "error", "-y", "-f", "rawvideo", "-pix_fmt",
@@ -61,27 +31,8 @@ std::vector<std::string> argumentsFor(const VideoOptions& options, const fs::pat
 struct VideoWriter::State {
   fs::path path, partial;
   VideoOptions options;
-  pid_t process = -1;
-  Descriptor frames;    // a socket, because writing to a pipe of a program that died would raise SIGPIPE
-  Descriptor messages;  // the output of the program, in a memory file
-
-  std::string lastWords() const {
-    char text[400];
-    const off_t size = ::lseek(messages.get(), 0, SEEK_END);
-    const off_t from = std::max<off_t>(0, size - static_cast<off_t>(sizeof text));
-    const ssize_t count = ::pread(messages.get(), text, sizeof text, from);
-    std::string words(text, count > 0 ? static_cast<size_t>(count) : 0);
-    while (!words.empty() && std::isspace(static_cast<unsigned char>(words.back()))) words.pop_back();
-    return words;
-  }
-
-  int wait() {
-    int status = 0;
-    while (::waitpid(process, &status, 0) < 0 && errno == EINTR) {
-    }
-    process = -1;
-    return status;
-  }
+  ChildProcess process;
+  Descriptor frames;  // a socket, because writing to a pipe of a program that died would raise SIGPIPE
 
   void removePartial() const {
     std::error_code ignored;
@@ -90,9 +41,9 @@ struct VideoWriter::State {
 
   [[noreturn]] void fail() {
     frames.close();
-    if (process > 0) wait();
+    if (process.isRunning()) process.wait();
     removePartial();
-    const std::string words = lastWords();
+    const std::string words = process.lastWords();
     throw Error(path.string(), "", options.program + " failed" + (words.empty() ? "" : ": " + words),
                 "check that it can encode H.264 (libx264), and the free space");
   }
@@ -110,37 +61,21 @@ VideoWriter::VideoWriter(fs::path path, const VideoOptions& options) : state_(st
   if (state.path.has_parent_path()) fs::create_directories(state.path.parent_path(), status);
 
   int ends[2];
-  state.messages.reset(::memfd_create("ffmpeg messages", MFD_CLOEXEC));
-  if (state.messages.get() < 0 || ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
     throw Error(options.program, "", std::strerror(errno), "close other programs and try again");
   }
   state.frames.reset(ends[0]);
   const Descriptor theirs(ends[1]);
 
-  std::vector<std::string> arguments = argumentsFor(options, state.partial);
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  pointers.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  posix_spawn_file_actions_adddup2(&actions, theirs.get(), STDIN_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, state.messages.get(), STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, state.messages.get(), STDERR_FILENO);
-  const int failure =
-      ::posix_spawnp(&state.process, options.program.c_str(), &actions, nullptr, pointers.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failure != 0) {
-    state.process = -1;
-    throw Error(options.program, "",
-                std::string("the program that encodes video cannot be started: ") + std::strerror(failure),
-                "install it (apt-get install ffmpeg), or render to a folder of PNGs");
-  }
+  const std::string failure = state.process.start(argumentsFor(options, state.partial), theirs.get());
+  if (failure.empty()) return;
+  throw Error(options.program, "", "the program that encodes video cannot be started: " + failure,
+              "install it (apt-get install ffmpeg), or render to a folder of PNGs");
 }
 
 VideoWriter::~VideoWriter() {
-  if (state_->process <= 0) return;
-  ::kill(state_->process, SIGKILL);
-  state_->wait();
+  if (!state_->process.isRunning()) return;
+  state_->process.kill();
   state_->removePartial();
 }
 
@@ -161,11 +96,11 @@ void VideoWriter::add(const ImageU8& frame) {
 
 void VideoWriter::finish() {
   State& state = *state_;
-  CHECK(state.process > 0);
+  CHECK(state.process.isRunning());
   state.frames.close();
-  const int status = state.wait();
+  const bool succeeded = state.process.wait().empty();
   std::error_code unreadable;
-  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0 || fs::file_size(state.partial, unreadable) == 0 || unreadable) {
+  if (!succeeded || fs::file_size(state.partial, unreadable) == 0 || unreadable) {
     state.fail();
   }
   std::error_code failure;

@@ -6,14 +6,17 @@
 #include <atomic>
 #include <cmath>
 #include <mutex>
+#include <optional>
 #include <set>
 
 #include "base/error.h"
+#include "base/image_io.h"
 #include "base/log.h"
 #include "base/progress.h"
 #include "import/clean.h"
 #include "import/colmap_model.h"
 #include "import/holdout.h"
+#include "import/mask_command.h"
 #include "import/orient_world.h"
 #include "import/photo_files.h"
 #include "import/picture_origins.h"
@@ -162,6 +165,30 @@ struct Outcomes {
   std::vector<std::string> withoutMask, withoutDepth;
 };
 
+// Makes the masks of all imported photos that are not ready. A program may take all cores and much memory, so one runs
+// at a time.
+void runMaskCommand(SourceCapture& source, const std::vector<fs::path>& targets, const std::string& text,
+                    Outcomes& outcomes) {
+  const MaskCommand command(text);
+  std::vector<Photo>& photos = source.capture.photos;
+  Progress progress("masks", static_cast<int64_t>(photos.size()), "photos");
+  for (size_t i = 0; i < photos.size(); ++i) {
+    if (outcomes.photos[i] != FileOutcome::ready) continue;
+    const ImageInfo image = probeImageFile(photos[i].image);
+    if (!isReady(photos[i].image, targets[i], image.width, image.height)) {
+      std::optional<ImageU8> other;
+      if (!photos[i].mask.empty()) {
+        other = readMask(photos[i].mask, image.width, image.height, source.maskIsInverted[i]);
+        if (!other) outcomes.withoutMask.push_back(photos[i].name);
+      }
+      command.makeMask(photos[i].image, targets[i], other.value_or(ImageU8()));
+    }
+    photos[i].mask = targets[i];
+    progress.update(static_cast<int64_t>(i) + 1);
+  }
+  progress.finish();
+}
+
 // Imports all images, masks and depth maps. The paths in Photo point into the capture afterwards.
 Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& facts, const fs::path& out,
                         const ImportOptions& options, double scale, ThreadPool& pool) {
@@ -188,8 +215,14 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
     maskTargets.push_back(out / mask);
     const std::string how = fmt::format("{} x {}", size.width, size.height);
     origins.add(photos[i].name, photos[i].image, how);
-    if (!photos[i].mask.empty())
-      origins.add(mask, photos[i].mask, how + (source.maskIsInverted[i] ? ", inverted" : ""));
+    const bool hasMask = !photos[i].mask.empty();
+    const std::string conversion = how + (hasMask && source.maskIsInverted[i] ? ", inverted" : "");
+    if (!options.maskCommand.empty()) {
+      const std::string other = hasMask ? ", and " + describeFile(photos[i].mask) : "";
+      origins.add(mask, photos[i].image, conversion + ", masked by " + options.maskCommand + other);
+    } else if (hasMask) {
+      origins.add(mask, photos[i].mask, conversion);
+    }
     depthTargets.push_back(out / names.unique("depths", inner, ".exr"));
   }
   // While images change, the folder is not a complete capture.
@@ -207,7 +240,7 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
     bool maskOk = true, depthOk = true;
     if (outcomes.photos[i] == FileOutcome::ready) {
       photo.image = imageTargets[i];
-      if (!photo.mask.empty()) {
+      if (!photo.mask.empty() && options.maskCommand.empty()) {
         maskOk = importMask(photo.mask, maskTargets[i], size.width, size.height, source.maskIsInverted[i]) ==
                  FileOutcome::ready;
         photo.mask = maskOk ? maskTargets[i] : fs::path();
@@ -224,6 +257,7 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
     progress.update(++done);
   });
   progress.finish();
+  if (!options.maskCommand.empty()) runMaskCommand(source, maskTargets, options.maskCommand, outcomes);
   return outcomes;
 }
 
@@ -246,7 +280,7 @@ void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
   warnDropped(truncated, "end early (truncated)");
   warnDropped(unreadable, "cannot be decoded");
   if (!outcomes.withoutMask.empty()) {
-    warn("{} masks are missing or unreadable: those photos train unmasked ({}, ...)", outcomes.withoutMask.size(),
+    warn("{} masks are missing or unreadable, and have no effect ({}, ...)", outcomes.withoutMask.size(),
          outcomes.withoutMask[0]);
   }
   if (!outcomes.withoutDepth.empty()) {
@@ -272,6 +306,7 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
     throw Error(out.string(), "", "is the source itself", "name another folder to write to");
   }
   checkHoldOut(options.holdout);
+  if (!options.maskCommand.empty()) MaskCommand{options.maskCommand};  // throws Error if it is malformed
   ThreadPool pool(options.threads);
   SourceCapture source = readSource(sourcePath);
   if (options.holdout == "auto" && source.splitError) throw *source.splitError;

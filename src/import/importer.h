@@ -8,6 +8,7 @@
 //                                                                    another one: dropped, warning
 //   pose not finite or not rigid, path that leaves the folder        dropped, warning
 //   mask or depth map missing or unreadable                          the photo is imported without it, warning
+//   mask command that fails or writes no usable mask                 Error
 //   model or JSON damaged, counts implausible, no usable photo left  Error
 //
 // The result is self-contained: images/, masks/ (black = do not train), depths/ (EXR), transforms.json, points.ply,
@@ -28,6 +29,8 @@ struct ImportOptions {
   // split but no test split is evaluated on the former.
   std::string holdout = "auto";
   int threads = 0;  // 0: all
+  // MaskCommand: run for each photo as it is stored, one after another. Masks of the source apply, too. Empty: none.
+  std::string maskCommand;
 };
 
 // Throws Error if `source` cannot be imported; if it is a plain folder of photos, the error names the commands to run.

@@ -11,21 +11,6 @@
 namespace tessera {
 namespace {
 
-bool isReady(const fs::path& source, const fs::path& target, int width, int height) {
-  std::error_code status;
-  if (!fs::is_regular_file(target, status)) return false;
-  const auto sourceTime = fs::last_write_time(source, status);
-  if (status) return false;
-  const auto targetTime = fs::last_write_time(target, status);
-  if (status || targetTime < sourceTime) return false;
-  try {
-    const ImageInfo info = probeImageFile(target);
-    return info.width == width && info.height == height;
-  } catch (const Error&) {
-    return false;
-  }
-}
-
 void linkOrCopy(const fs::path& source, const fs::path& target) {
   std::error_code status;
   fs::create_directories(target.parent_path(), status);
@@ -73,6 +58,21 @@ Image<T> nearestSamples(const Image<T>& image, int width, int height) {
 
 }  // namespace
 
+bool isReady(const fs::path& source, const fs::path& target, int width, int height) {
+  std::error_code status;
+  if (!fs::is_regular_file(target, status)) return false;
+  const auto sourceTime = fs::last_write_time(source, status);
+  if (status) return false;
+  const auto targetTime = fs::last_write_time(target, status);
+  if (status || targetTime < sourceTime) return false;
+  try {
+    const ImageInfo info = probeImageFile(target);
+    return info.width == width && info.height == height;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 FileOutcome importPhoto(const fs::path& source, const fs::path& target, int width, int height) {
   if (isReady(source, target, width, height)) return FileOutcome::ready;
   const auto decoded = decodeImage(readFile(source));
@@ -94,13 +94,7 @@ FileOutcome importPhoto(const fs::path& source, const fs::path& target, int widt
   return FileOutcome::ready;
 }
 
-FileOutcome importMask(const fs::path& source, const fs::path& target, int width, int height, bool inverted) {
-  if (isReady(source, target, width, height)) return FileOutcome::ready;
-  std::error_code status;
-  if (!fs::is_regular_file(source, status)) return FileOutcome::unreadable;
-  const auto decoded = decodeImage(readFile(source));
-  if (!decoded) return FileOutcome::unreadable;
-  const ImageU8& image = decoded->image;
+ImageU8 toMask(const ImageU8& image, bool inverted) {
   const int colours = std::min(image.channels, 3);
   ImageU8 mask(image.width, image.height, 1);
   for (size_t i = 0; i < image.pixelCount(); ++i) {
@@ -109,13 +103,26 @@ FileOutcome importMask(const fs::path& source, const fs::path& target, int width
     const int brightest = *std::max_element(pixel, pixel + colours);
     mask.pixels[i] = (inverted ? brightest == 0 : brightest >= 128) ? 255 : 0;
   }
-  if (image.width >= width && image.height >= height) {
-    mask = downscaleByArea(mask, width, height);
-    for (uint8_t& value : mask.pixels) value = value == 255 ? 255 : 0;
-  } else {
-    mask = nearestSamples(mask, width, height);
-  }
-  writePng(target, mask);
+  return mask;
+}
+
+std::optional<ImageU8> readMask(const fs::path& source, int width, int height, bool inverted) {
+  std::error_code status;
+  if (!fs::is_regular_file(source, status)) return std::nullopt;
+  const auto decoded = decodeImage(readFile(source));
+  if (!decoded) return std::nullopt;
+  ImageU8 mask = toMask(decoded->image, inverted);
+  if (mask.width < width || mask.height < height) return nearestSamples(mask, width, height);
+  mask = downscaleByArea(mask, width, height);
+  for (uint8_t& value : mask.pixels) value = value == 255 ? 255 : 0;
+  return mask;
+}
+
+FileOutcome importMask(const fs::path& source, const fs::path& target, int width, int height, bool inverted) {
+  if (isReady(source, target, width, height)) return FileOutcome::ready;
+  const auto mask = readMask(source, width, height, inverted);
+  if (!mask) return FileOutcome::unreadable;
+  writePng(target, *mask);
   return FileOutcome::ready;
 }
 

@@ -3,7 +3,10 @@
 // produced from this source (picture_origins.h).
 #pragma once
 
+#include <optional>
+
 #include "base/file.h"
+#include "base/image.h"
 
 namespace tessera {
 
@@ -24,6 +27,14 @@ inline constexpr int64_t kLosslessPixels = int64_t{1} << 21;
 // Imports a mask, with one channel of 0 or 255. A pixel is trained on only where all of its source area is white, or,
 // if `inverted`, where all of it is black.
 FileOutcome importMask(const fs::path& source, const fs::path& target, int width, int height, bool inverted);
+// Returns the mask that importMask would write; nothing if the source is missing or cannot be decoded.
+std::optional<ImageU8> readMask(const fs::path& source, int width, int height, bool inverted);
+// Returns a mask of one channel, 0 or 255: 255 where a colour of the image is bright, or, if `inverted`, where it is
+// black.
+ImageU8 toMask(const ImageU8& image, bool inverted);
+
+// Whether the target is there, of that size and not older than its source.
+bool isReady(const fs::path& source, const fs::path& target, int width, int height);
 
 struct DepthUnits {
   float unit = 1;    // world units per step of a PNG

@@ -32,12 +32,16 @@ std::map<std::string, std::string> readFingerprints(const fs::path& file) {
 
 }  // namespace
 
-void PictureOrigins::add(const std::string& picture, const fs::path& source, const std::string& how) {
+std::string describeFile(const fs::path& file) {
   std::error_code status;
-  const fs::path path = fs::weakly_canonical(source, status);
-  const uintmax_t bytes = fs::file_size(source, status);
-  const auto time = fs::last_write_time(source, status).time_since_epoch().count();
-  origins_[picture] = {source, hashText(fmt::format("{}\n{}\n{}\n{}", path.string(), bytes, time, how))};
+  const fs::path path = fs::weakly_canonical(file, status);
+  const uintmax_t bytes = fs::file_size(file, status);
+  const auto time = fs::last_write_time(file, status).time_since_epoch().count();
+  return fmt::format("{}\n{}\n{}", path.string(), bytes, time);
+}
+
+void PictureOrigins::add(const std::string& picture, const fs::path& source, const std::string& how) {
+  origins_[picture] = {source, hashText(describeFile(source) + "\n" + how)};
 }
 
 void PictureOrigins::claim(const fs::path& capture) const {

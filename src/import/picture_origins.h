@@ -13,6 +13,9 @@
 
 namespace tessera {
 
+// Returns the path, size and time of a file.
+std::string describeFile(const fs::path& file);
+
 class PictureOrigins {
  public:
   // Adds an image. `picture` is its path in the capture; `how` describes everything else that its pixels depend on.

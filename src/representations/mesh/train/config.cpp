@@ -19,7 +19,7 @@ MeshConfig MeshConfig::ofPreset(const std::string& name) {
   config.meshCells = 128;
   config.everyCell = true;
   config.surfaceStart = false;
-  config.networkL2 = config.distortionWeight = config.finalShare = config.droppedShare = 0;
+  config.networkL2 = config.distortionWeight = config.throughShare = config.finalShare = config.droppedShare = 0;
   config.exposure = false;
   config.patchTexels = 32;
   return config;
@@ -71,6 +71,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       lossSetting(),
       lossParameterSetting(),
       opaqueLossSetting(),
+      throughShareSetting(),
       finalShareSetting(),
       fittedLevelsSetting(),
       droppedShareSetting(),

@@ -68,6 +68,11 @@ struct MeshConfig : BackgroundBlockSettings,
   SETTING(double, minCosine, 0.1, "min_cosine",
           "a vertex is moved as if no ray hit its faces at a flatter angle than this cosine", share());
   SETTING(bool, opaqueLoss, true, "opaque_loss", "the second loss, which makes surfaces opaque", anything());
+  SETTING(
+      double, throughShare, 0.1, "through_share",
+      "rays through a block that end behind it, at most, in addition to the others and relative to their number: they "
+      "empty the space in front of surfaces; 0: none",
+      share());
   SETTING(double, finalShare, 0.2, "final_share",
           "share of the steps for the final stage, which trains through texels as they are baked; 0: none",
           within(0, 0.9));

@@ -99,18 +99,11 @@ void MeshField::encodeForBackward(Count texels, Slice<const float> positions) {
       MlpForward{shape_.encoder, texels, byLevel(encoded_), encoder_.values, encodedFeatures(), encoderActivations_});
 }
 
-void MeshField::encodeBackward(Count texels, Slice<const float> positions, Matrix<const float> featureGradients) {
+void MeshField::encodeBackward(Count texels, Slice<const float> positions, Matrix<const float> featureGradients,
+                               Slice<const float> logitGradients) {
   const Matrix<float> encodedGradients = byLevel(encodedGradients_);
-  device_.run(MlpBackward{shape_.encoder,
-                          texels,
-                          byLevel(encoded_),
-                          encoder_.values,
-                          encodedFeatures(),
-                          encoderActivations_,
-                          featureGradients,
-                          {},
-                          encoder_.gradients,
-                          encodedGradients});
+  device_.run(MlpBackward{shape_.encoder, texels, byLevel(encoded_), encoder_.values, encodedFeatures(),
+                          encoderActivations_, featureGradients, logitGradients, encoder_.gradients, encodedGradients});
   device_.run(HashGridBackward{shape_.grid, texels, positions, table_.values, encodedGradients, table_.gradients, {}});
 }
 

@@ -53,7 +53,9 @@ class MeshField {
   // another function.
   void encodeForBackward(Count texels, Slice<const float> positions);
   Matrix<float> encodedFeatures() { return Matrix<float>(texelFeatures_, kFeatures); }
-  void encodeBackward(Count texels, Slice<const float> positions, Matrix<const float> featureGradients);
+  // `logitGradients`: optional, [capacity], added to those of the first feature.
+  void encodeBackward(Count texels, Slice<const float> positions, Matrix<const float> featureGradients,
+                      Slice<const float> logitGradients = {});
   Matrix<float> decoderFeatures() { return features(); }
   Matrix<const float> decode(Count hits, Slice<const float> directions, Slice<const uint32_t> rayOfHit);
   Matrix<const float> decodeBackward(Count hits, Matrix<const float> colourGradients, bool trains);

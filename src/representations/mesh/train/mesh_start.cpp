@@ -30,6 +30,25 @@ std::array<double, 2> rangeInBox(const Vec3d& origin, const Vec3d& direction, co
   return range;
 }
 
+void addTile(TileShares& shares, const PhotoTile& tile) {
+  const double pixels = static_cast<double>(tile.right - tile.left) * static_cast<double>(tile.bottom - tile.top);
+  shares.until.push_back(shares.total() + pixels);
+  shares.tiles.push_back(tile);
+}
+
+// Whether a ray crosses a block, and whatever it shows lies beyond the block's grid. `clear`: the distance up to which
+// it shows nothing.
+bool showsBehind(const MeshPart& block, const Vec3d& eye, const Vec3d& towards, double clear) {
+  constexpr double kDepthError = 0.02;  // of the coarse field's distances
+  constexpr float kGrid = static_cast<float>(1 / (1 - 2 * kBlockMargin));
+  const auto [enter, leave] = rangeInBox(eye, towards, block.halfEdges);
+  if (enter >= leave) return false;
+  // Nothing is seen below a block: where the coarse field shows something there, it has a hole in the ground.
+  constexpr double kBottom = 1e-3;
+  if (eye.z() + leave * towards.z() < kBottom - block.halfEdges[2]) return false;
+  return (1 - kDepthError) * clear > rangeInBox(eye, towards, {kGrid, kGrid, kGrid})[1];
+}
+
 }  // namespace
 
 bool MeshStart::isEmpty() const {
@@ -46,37 +65,49 @@ SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool se
     : frame_(coarse.frame()), space_(coarse.space()), photoCount_(capture.photos.size()) {
   FieldRenderer renderer(coarse);
   for (const int photo : capture.photosIn(Split::train)) {
-    const Pose& pose = capture.photos[photo].worldFromCamera;
-    const Camera& camera = capture.cameras[capture.photos[photo].camera];
-    const int columns = std::max(1, camera.width / kTileEdge), rows = std::max(1, camera.height / kTileEdge);
-    const Camera small = camera.scaledTo(columns, rows);
-    const RenderedView view = renderer.render(small, pose, nullptr);
-    for (int y = 0; y < rows; ++y) {
-      for (int x = 0; x < columns; ++x) {
-        const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
-        if (!inCamera) continue;
-        Sight sight;
-        sight.tile = {photo, static_cast<uint32_t>(camera.width * x / columns),
-                      static_cast<uint32_t>(camera.height * y / rows),
-                      static_cast<uint32_t>(camera.width * (x + 1) / columns),
-                      static_cast<uint32_t>(camera.height * (y + 1) / rows)};
-        sight.eye = pose.translation;
-        sight.towards = (pose.rotation * *inCamera).normalized();
-        const double opacity = *view.opacity.at(x, y), cosine = inCamera->normalized().z();
-        sight.isSurface = opacity >= 0.5 && cosine > 0;
-        if (sight.isSurface) {
-          sight.distance = *view.depth.at(x, y) / opacity / cosine;
-          sight.pixelWidth = sight.distance / camera.focalX();
-        }
-        sights_.push_back(sight);
-      }
-    }
+    const Photo& of = capture.photos[photo];
+    addSights(photo, capture.cameras[of.camera], of.worldFromCamera, renderer);
   }
   if (seesPoints) addSurface(capture, renderer);
   CullOptions options;
   options.stride = kPhotoStride;
   renderer.cullUnseen(capture, options);
   cells_ = coarse.device().read(renderer.cells());
+}
+
+void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose, FieldRenderer& renderer) {
+  constexpr double kSurface = 0.5, kClear = 0.1;  // opacities, at least and at most
+  const int columns = std::max(1, camera.width / kTileEdge), rows = std::max(1, camera.height / kTileEdge);
+  const Camera small = camera.scaledTo(columns, rows);
+  const RenderedView view = renderer.render(small, pose, nullptr);
+  const auto distanceAt = [&](int x, int y) {
+    const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
+    const double opacity = *view.opacity.at(x, y), cosine = inCamera ? inCamera->normalized().z() : 0;
+    return opacity >= kClear && cosine > 0 ? *view.depth.at(x, y) / opacity / cosine : kNever;
+  };
+  for (int y = 0; y < rows; ++y) {
+    for (int x = 0; x < columns; ++x) {
+      const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
+      if (!inCamera) continue;
+      Sight sight;
+      sight.tile = {photo, static_cast<uint32_t>(camera.width * x / columns),
+                    static_cast<uint32_t>(camera.height * y / rows),
+                    static_cast<uint32_t>(camera.width * (x + 1) / columns),
+                    static_cast<uint32_t>(camera.height * (y + 1) / rows)};
+      sight.eye = pose.translation;
+      sight.towards = (pose.rotation * *inCamera).normalized();
+      sight.isSurface = *view.opacity.at(x, y) >= kSurface && inCamera->z() > 0;
+      if (sight.isSurface) {
+        sight.distance = distanceAt(x, y);
+        sight.pixelWidth = sight.distance / camera.focalX();
+      }
+      sight.clear = kNever;
+      for (int besideY = std::max(0, y - 1); besideY <= std::min(rows - 1, y + 1); ++besideY)
+        for (int besideX = std::max(0, x - 1); besideX <= std::min(columns - 1, x + 1); ++besideX)
+          sight.clear = std::min(sight.clear, distanceAt(besideX, besideY));
+      sights_.push_back(sight);
+    }
+  }
 }
 
 void SurfaceSurvey::addSurface(const Capture& capture, FieldRenderer& renderer) {
@@ -180,14 +211,11 @@ MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& 
       const auto [enter, leave] = rangeInBox(eye, towards, part.halfEdges);
       if (enter < leave && distance <= leave) continue;
     } else {
+      if (showsBehind(part, eye, towards, sight.clear * part.frame.scale)) addTile(start.through, sight.tile);
       if (!sight.isSurface) continue;
       if ((eye + distance * towards).cwiseAbs().maxCoeff() > kReach) continue;
     }
-    TileShares& shares = start.tiles[static_cast<size_t>(sight.tile.photo)];
-    const double pixels = static_cast<double>(sight.tile.right - sight.tile.left) *
-                          static_cast<double>(sight.tile.bottom - sight.tile.top);
-    shares.until.push_back(shares.total() + pixels);
-    shares.tiles.push_back(sight.tile);
+    addTile(start.tiles[static_cast<size_t>(sight.tile.photo)], sight.tile);
     if (sight.isSurface) pixelWidths.push_back(sight.pixelWidth * part.frame.scale);
   }
   if (!pixelWidths.empty()) {

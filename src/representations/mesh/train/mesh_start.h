@@ -15,6 +15,7 @@ struct MeshStart {
   std::vector<bool> cells;           // [cells of the lattice] of the finest level
   std::vector<float> displacements;  // SurfaceSurvey::findDisplacements; empty: vertices start in the middle of cells
   std::vector<TileShares> tiles;     // [photo]; only training photos have some
+  TileShares through;                // of a block, of all training photos: they show only what lies behind it
   double pixelWidth = 0;             // of a photo on the surfaces, the median, units of the part; 0: unknown
 
   // Nothing can be trained without both.
@@ -30,7 +31,8 @@ class SurfaceSurvey {
 
   // Finds the cells of `domain`, of the part's finest level, in which there may be a surface, and the tiles whose
   // middles show one in the block or up to half of its margin beside it; outside: the tiles that show the sky, or a
-  // surface that is not in front of the region.
+  // surface that is not in front of the region. The tiles through a block are those whose middles' rays cross it, leave
+  // it not through its bottom, and show nothing on this side of its grid's far end; neither do the tiles around them.
   MeshStart findStart(const MeshPart& part, const OctahedraDomain& domain) const;
   // Returns the displacements of a block's vertices, [cells][3] in edges of a cell, to the mean of the points of
   // surfaces that photos show in the cell; zero if there are fewer than three.
@@ -44,8 +46,10 @@ class SurfaceSurvey {
     double distance = 0;    // of the surface, in world units
     bool isSurface = true;  // else the sky
     double pixelWidth = 0;  // on the surface, in world units
+    double clear = 0;       // nothing is nearer in this tile and those around it, in world units
   };
 
+  void addSights(int photo, const Camera& camera, const Pose& pose, FieldRenderer& renderer);
   void addSurface(const Capture& capture, FieldRenderer& renderer);
 
   SceneFrame frame_;  // of the coarse field

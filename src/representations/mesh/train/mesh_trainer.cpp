@@ -7,9 +7,11 @@
 #include "base/random.h"
 #include "compute/composite.h"
 #include "compute/cube_map.h"
+#include "compute/losses.h"
 #include "representations/mesh/train/extraction.h"
 #include "representations/mesh/train/level_fit.h"
 #include "representations/mesh/train/mesh_schedule.h"
+#include "train/colour_loss.h"
 
 namespace tessera {
 namespace {
@@ -62,6 +64,7 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
   model_.level(0).exclude(start.cells);
   if (!start.displacements.empty())
     device.write(model_.level(0).displacements().values.all(), std::span<const float>(start.displacements));
+  const double pixels = start.pixels();
   tiles_ = start.tiles;
   pixelWidth_ = start.pixelWidth;
   photoRays_.drawFrom(std::move(start.tiles));
@@ -70,17 +73,23 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
       std::max(kCapacityPerDemand * static_cast<uint32_t>(config.samplesPerStep), kMaxTrainingHits);
   hits_ = MeshHits(device, rays, samples);
   const size_t levels = config.levels();
-  counters_ = device.array<uint32_t>(levels * MeshHits::kCounters + AtlasStage::kCounters);
+  counters_ = device.array<uint32_t>((levels + 1) * MeshHits::kCounters + AtlasStage::kCounters);
   model_.field().reserve(samples);
   for (Array<float>* perRay : {&opacity_, &opaqueOpacity_}) *perRay = device.array<float>(rays);
   for (Array<float>* perRay : {&colour_, &opaqueColour_, &skyColour_}) *perRay = device.array<float>(size_t{rays} * 3);
-  losses_ = device.array<float>(levels * kLosses);
+  losses_ = device.array<float>(levels * kLosses + PhotoLoss::kLosses);
   coarseLosses_ = device.array<float>(AtlasStage::kLosses);
   coarseCounters_ = device.array<uint32_t>(AtlasStage::kCounters);
   for (Array<float>* perSample : {&sampleWeights_, &sampleSteps_, &weightGradients_, &logitGradients_})
     *perSample = device.array<float>(samples);
   for (Array<float>* perSample : {&sampleColourGradients_, &positionGradients_})
     *perSample = device.array<float>(size_t{samples} * 3);
+  // They are not drawn more densely than other rays: the coarse field may be wrong about few pixels.
+  throughShare_ = std::min(config.throughShare, start.through.total() / std::max(1.0, pixels));
+  if (throughShare_ <= 0) return;
+  throughRays_.emplace(device, capture, part.frame, std::move(start.through), static_cast<uint64_t>(config.seed), rays);
+  rayOpacityGradients_ = device.array<float>(rays);
+  zeros_ = device.array<float>(std::max(rays, samples * MeshField::kFeatures));
 }
 
 void MeshTrainer::refreshOccupancy(int64_t step) {
@@ -200,16 +209,22 @@ StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
   const uint32_t rays = budget_.rays();
   photoRays_.draw(step, rays);
   for (uint32_t level = 0; level < model_.levels(); ++level) addGradients(level, step, plannedSteps);
+  const bool drawsThrough = addThroughGradients(step) > 0;
   updateNetworks(config_.rateSchedule().at(step, plannedSteps));
   if (movesVertices(step)) updateVertices(step, plannedSteps);
 
   // The step is over, so its counters may be read.
   const auto [counters, losses] = device_.readAll(counters_.all(), losses_.all());
   StepReport report;
-  report.samples = report.marched = std::min<uint32_t>(counters[0], static_cast<uint32_t>(hits_.distances.size()));
+  const auto countHits = [&](uint32_t all) { return std::min(all, static_cast<uint32_t>(hits_.distances.size())); };
+  report.samples = report.marched = countHits(counters[0]);
   report.rays = counters[1];
   constexpr uint32_t kColours = PhotoLoss::kLosses;
   report.loss = losses[0] + losses[kColours] + losses[2 * kColours] + losses[2 * kColours + 1];
+  if (drawsThrough) {
+    report.samples += countHits(counters[counters.size() - AtlasStage::kCounters - MeshHits::kCounters]);
+    report.loss += losses[losses.size() - PhotoLoss::kLosses];
+  }
   double weight = 0;
   for (uint32_t ray = 0; ray < report.rays; ++ray) weight += photoRays_.batch().weights[ray];
   report.squaredError = losses[1] / std::max(1.0, 3 * weight);
@@ -359,6 +374,58 @@ void MeshTrainer::addOpaqueLoss(const Batch& batch, double weight, double thresh
   back.xGradients = logitGradients_;
   back.colourGradients = Matrix<float>(sampleColourGradients_, 3);
   device_.run(back);
+}
+
+uint32_t MeshTrainer::addThroughGradients(int64_t step) {
+  if (!throughRays_) return 0;
+  // The colour loss takes the opacities of three rays as one colour.
+  constexpr uint32_t kOpacitiesPerColour = 3;
+  const auto colours = static_cast<uint32_t>(throughShare_ * photoRays_.count() / kOpacitiesPerColour);
+  const uint32_t rays = kOpacitiesPerColour * colours;
+  if (rays == 0) return 0;
+  throughRays_->draw(step, rays);
+  hits_.counters = counters_.part(counters_.size() - AtlasStage::kCounters - MeshHits::kCounters, MeshHits::kCounters);
+  model_.level(0).trace(throughRays_->rays(), kMaxTrainingHits, false, hits_);
+  const Count samples = hits_.samples(), finished = hits_.finished(rays);
+  model_.field().encodeForBackward(samples, hits_.positions);
+
+  CompositeForward composite;
+  composite.extinction = Extinction::logit;
+  composite.offset = model_.opacityOffset();
+  composite.minTransmittance = kMinTrainingTransmittance;
+  composite.rays = finished;
+  composite.firstSample = hits_.firstSample;
+  composite.x = model_.field().encodedFeatures().columnRange(0, 1);
+  composite.opacity = opacity_;
+  composite.weights = sampleWeights_;
+  device_.fillZero(opacity_.part(0, rays));  // of rays whose hits do not fit
+  device_.run(composite);
+
+  // As if a photo showed the background there: each of these rays counts as much as one of a photo.
+  ColourLoss loss;
+  loss.kind = colourLossKind(config_.loss);
+  loss.parameter = static_cast<float>(config_.lossParameter);
+  loss.scale = 1 / static_cast<float>(photoRays_.count());
+  loss.rays = {colours, {}};
+  loss.predicted = opacity_.part(0, rays);
+  loss.target = zeros_.part(0, rays);
+  loss.loss = losses_.part(losses_.size() - PhotoLoss::kLosses, PhotoLoss::kLosses);
+  loss.gradients = rayOpacityGradients_.part(0, rays);
+  device_.run(loss);
+
+  CompositeBackward back;
+  back.extinction = composite.extinction;
+  back.offset = composite.offset;
+  back.minTransmittance = composite.minTransmittance;
+  back.rays = finished;
+  back.firstSample = hits_.firstSample;
+  back.x = composite.x;
+  back.rayOpacityGradients = rayOpacityGradients_;
+  back.xGradients = logitGradients_;
+  device_.run(back);
+  model_.field().encodeBackward(samples, hits_.positions, Matrix<const float>(zeros_, MeshField::kFeatures),
+                                logitGradients_);
+  return rays;
 }
 
 void MeshTrainer::updateNetworks(double rate) {

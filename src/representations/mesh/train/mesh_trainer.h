@@ -4,6 +4,7 @@
 #include "representations/mesh/train/atlas_stage.h"
 #include "representations/mesh/train/mesh_model.h"
 #include "representations/mesh/train/mesh_start.h"
+#include "representations/mesh/train/through_rays.h"
 #include "train/photo_loss.h"
 #include "train/ray_budget.h"
 #include "train/training_loop.h"
@@ -50,6 +51,9 @@ class MeshTrainer final : public TrainableModel {
   // hits stand before the sky, and there is no second loss.
   void addVolumeLoss(const Batch& batch, double weight);
   void addOpaqueLoss(const Batch& batch, double weight, double threshold);
+  // Draws rays through the block, and adds the gradients of their loss, of the opacities alone, to the encoder and the
+  // table. Returns their number.
+  uint32_t addThroughGradients(int64_t step);
   void updateNetworks(double rate);
   void updateVertices(int64_t step, int64_t steps);
 
@@ -58,6 +62,8 @@ class MeshTrainer final : public TrainableModel {
   MeshConfig config_;
   MeshModel model_;
   PhotoRays photoRays_;
+  std::optional<ThroughRays> throughRays_;
+  double throughShare_ = 0;  // relative to the other rays
   PhotoLoss photoLoss_;
   RayBudget budget_;
   MeshHits hits_;
@@ -66,6 +72,7 @@ class MeshTrainer final : public TrainableModel {
   Array<uint32_t> coarseCounters_;
   Array<float> sampleWeights_, sampleSteps_, weightGradients_, logitGradients_, sampleColourGradients_,
       positionGradients_;
+  Array<float> rayOpacityGradients_, zeros_;             // for rays through the block
   std::vector<TileShares> tiles_;                        // [photo]
   double pixelWidth_ = 0;                                // MeshStart::pixelWidth
   std::vector<std::unique_ptr<AtlasStage>> finalStage_;  // of each level

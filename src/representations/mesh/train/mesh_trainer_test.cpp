@@ -31,15 +31,39 @@ MeshStart startEverywhere(const CubeScene& scene, const OctahedraDomain& domain)
   return start;
 }
 
+// Training from the pixels of the cube alone: rays beside it are rays through the block.
+MeshStart startAtCube(const CubeScene& scene, const OctahedraDomain& domain) {
+  constexpr uint32_t kEdge = 4;
+  MeshStart start = startEverywhere(scene, domain);
+  for (const int index : scene.capture().photosIn(Split::train)) {
+    start.tiles[index] = {};
+    const Photo& photo = scene.capture().photos[index];
+    const RenderedView truth = scene.truth(scene.capture().cameras[photo.camera], photo.worldFromCamera);
+    for (uint32_t top = 0; top < CubeScene::kHeight; top += kEdge)
+      for (uint32_t left = 0; left < CubeScene::kWidth; left += kEdge) {
+        float sum = 0;
+        for (uint32_t pixel = 0; pixel < kEdge * kEdge; ++pixel)
+          sum += *truth.opacity.at(static_cast<int>(left + pixel % kEdge), static_cast<int>(top + pixel / kEdge));
+        TileShares& shares = sum > 0 ? start.tiles[index] : start.through;
+        shares.tiles.push_back({index, left, top, left + kEdge, top + kEdge});
+        shares.until.push_back(shares.total() + kEdge * kEdge);
+      }
+  }
+  return start;
+}
+
+using MakeStart = MeshStart (*)(const CubeScene&, const OctahedraDomain&);
+
 struct CubeTraining {
   std::unique_ptr<Device> device;
   std::unique_ptr<MeshTrainer> trainer;
   StepReport last;
 
-  CubeTraining(const CubeScene& scene, const MeshConfig& config, int64_t steps, int threads = 2)
+  CubeTraining(const CubeScene& scene, const MeshConfig& config, int64_t steps, int threads = 2,
+               MakeStart makeStart = startEverywhere)
       : device(makeDevice({"cpu", threads})),
         trainer(std::make_unique<MeshTrainer>(*device, scene.capture(), config, wholeCube(scene),
-                                              startEverywhere(scene, config.domain(wholeCube(scene), 0)))) {
+                                              makeStart(scene, config.domain(wholeCube(scene), 0)))) {
     for (int64_t step = 0; step < steps; ++step) last = trainer->step(step, steps);
   }
 };
@@ -213,31 +237,75 @@ TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {
     ASSERT_EQ(d, 0);
 }
 
+// Returns the mean opacity of the pixels of held-out photos that show nothing.
+double opacityBesideCube(const CubeScene& scene, MeshModel& model) {
+  MeshPartRenderer renderer(model, 0);
+  double sum = 0;
+  int pixels = 0;
+  for (const int index : scene.capture().photosIn(Split::test)) {
+    const Photo& photo = scene.capture().photos[index];
+    const Camera& camera = scene.capture().cameras[photo.camera];
+    const RenderedView view = renderer.render(camera, photo.worldFromCamera, nullptr),
+                       truth = scene.truth(camera, photo.worldFromCamera);
+    for (size_t pixel = 0; pixel < truth.opacity.pixels.size(); ++pixel) {
+      if (truth.opacity.pixels[pixel] > 0) continue;
+      sum += view.opacity.pixels[pixel];
+      ++pixels;
+    }
+  }
+  return sum / pixels;
+}
+
+TEST(MeshTrainer, EmptiesTheSpaceThatRaysThroughTheBlockCross) {
+  const CubeScene scene;
+  MeshConfig with = smallMeshConfig();
+  with.opacityOffset = -2;             // fog at the start
+  with.occupancyStartSteps = 1 << 20;  // which remains where no ray comes
+  with.finalShare = 0;
+  with.throughShare = 0.25;
+  MeshConfig without = with;
+  without.throughShare = 0;
+  constexpr int64_t kSteps = 150;
+  CubeTraining cleared(scene, with, kSteps, 2, startAtCube), foggy(scene, without, kSteps, 2, startAtCube);
+  const double left = opacityBesideCube(scene, cleared.trainer->model()),
+               fog = opacityBesideCube(scene, foggy.trainer->model());
+  EXPECT_GT(fog, 0.4);
+  EXPECT_LT(left, 0.2 * fog);
+  EXPECT_LT(cleared.last.rays, foggy.last.rays) << "their hits count as those of other rays";
+}
+
 TEST(MeshTrainer, MakesTheSameBytesOnAnyNumberOfThreads) {
   const CubeScene scene;
-  const Bytes one = CubeTraining(scene, smallMeshConfig(), 90, 1).trainer->save(0);
-  EXPECT_EQ(one, CubeTraining(scene, smallMeshConfig(), 90, 2).trainer->save(0));
-  EXPECT_EQ(one, CubeTraining(scene, smallMeshConfig(), 90, 5).trainer->save(0));
+  for (const MakeStart start : {startEverywhere, startAtCube}) {
+    const auto train = [&](int threads) {
+      return CubeTraining(scene, smallMeshConfig(), 90, threads, start).trainer->save(0);
+    };
+    const Bytes one = train(1);
+    EXPECT_EQ(one, train(2));
+    EXPECT_EQ(one, train(5));
+  }
 }
 
 TEST(MeshTrainer, GoesOnAfterRestoringAsIfNothingHadHappened) {
   const CubeScene scene;
   constexpr int64_t kSteps = 90;
-  CubeTraining unbroken(scene, smallMeshConfig(), kSteps);
-  Bytes state;
-  int64_t step = 0;
-  for (const int64_t until : {0, 1, 15, 17, 64, 65, 72, 90}) {
-    CubeTraining part(scene, smallMeshConfig(), 0);
-    if (!state.empty()) {
-      const auto file = decodeSafetensors(state);
-      ASSERT_TRUE(file);
-      part.trainer->restore(0, "state", *file);
+  for (const MakeStart start : {startEverywhere, startAtCube}) {
+    CubeTraining unbroken(scene, smallMeshConfig(), kSteps, 2, start);
+    Bytes state;
+    int64_t step = 0;
+    for (const int64_t until : {0, 1, 15, 17, 64, 65, 72, 90}) {
+      CubeTraining part(scene, smallMeshConfig(), 0, 2, start);
+      if (!state.empty()) {
+        const auto file = decodeSafetensors(state);
+        ASSERT_TRUE(file);
+        part.trainer->restore(0, "state", *file);
+      }
+      for (; step < until; ++step) part.trainer->step(step, kSteps);
+      state = part.trainer->save(0);
     }
-    for (; step < until; ++step) part.trainer->step(step, kSteps);
-    state = part.trainer->save(0);
+    EXPECT_EQ(state, unbroken.trainer->save(0));
+    EXPECT_NE(unbroken.trainer->model().coarseAtlas(1), nullptr) << "levels were fitted and stored, too";
   }
-  EXPECT_EQ(state, unbroken.trainer->save(0));
-  EXPECT_NE(unbroken.trainer->model().coarseAtlas(1), nullptr) << "levels were fitted and stored, too";
 }
 
 TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
@@ -310,6 +378,48 @@ TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
   MeshPart beside = block;
   beside.frame.centre += beside.frame.worldFromScene({3, 0, 0}) - beside.frame.worldFromScene({0, 0, 0});
   EXPECT_EQ(survey.findStart(beside, makeOctahedraDomain(beside, 32, OctahedraPlacement::checkerboard)).pixels(), 0);
+}
+
+TEST(SurfaceSurvey, FindsTheTilesThatShowOnlyWhatIsBehindABlock) {
+  const CubeScene scene;
+  TrainedCube coarse(scene, cubeConfig(), 300);
+  const SurfaceSurvey survey(scene.capture(), coarse.trainer->model(), false);
+  // A small block beside the cube, which is in front of it or behind it.
+  constexpr double kHalf = 0.2;
+  MeshPart block{"block_0_0", 0, {}, {1, 1, 1}};
+  block.frame.centre = CubeScene::centre() + Vec3d(1, 0, 0);
+  block.frame.scale = 1 / kHalf;
+  const TileShares through = survey.findStart(block, makeOctahedraDomain(block, 16, {})).through;
+  int onCube = 0, onSky = 0;
+  for (const PhotoTile& tile : through.tiles) {
+    const Photo& photo = scene.capture().photos[tile.photo];
+    ASSERT_EQ(photo.split, Split::train);
+    const Camera& camera = scene.capture().cameras[photo.camera];
+    const RenderedView truth = scene.truth(camera, photo.worldFromCamera);
+    const Vec2d middle = {0.5 * (tile.left + tile.right), 0.5 * (tile.top + tile.bottom)};
+    const Vec3d eye = block.frame.sceneFromWorld(photo.worldFromCamera.translation),
+                towards = photo.worldFromCamera.rotation * *camera.directionInCamera(middle);
+    double leave = 1e9;
+    for (int axis = 0; axis < 3; ++axis)
+      leave = std::min(leave, (std::copysign(1, towards[axis]) - eye[axis]) / towards[axis]);
+    EXPECT_GT(eye.z() + leave * towards.z(), -1) << photo.name << ": below the block";
+    for (int y = static_cast<int>(tile.top); y < static_cast<int>(tile.bottom); ++y)
+      for (int x = static_cast<int>(tile.left); x < static_cast<int>(tile.right); ++x) {
+        const float opacity = *truth.opacity.at(x, y);
+        ++(opacity > 0 ? onCube : onSky);
+        if (opacity == 0) continue;
+        const Vec3d inCamera = *camera.directionInCamera({x + 0.5, y + 0.5});
+        const Vec3d at = photo.worldFromCamera.translation +
+                         photo.worldFromCamera.rotation * inCamera / inCamera.z() * (*truth.depth.at(x, y) / opacity);
+        EXPECT_LT(at.x(), block.frame.centre.x() - kHalf) << photo.name;
+        EXPECT_GT(photo.worldFromCamera.translation.x(), block.frame.centre.x() - kHalf) << photo.name;
+      }
+  }
+  EXPECT_GT(onCube, 100);
+  EXPECT_GT(onSky, 100);
+  EXPECT_EQ(through.total(), onCube + onSky);
+  const MeshPart outside{"background", -1, coarse.frame, {1, 1, 1}};
+  EXPECT_TRUE(survey.findStart(outside, makeOctahedraDomain(outside, 16, {})).through.tiles.empty());
 }
 
 TEST(MeshModel, HasOnlyQuadsIfRequested) {

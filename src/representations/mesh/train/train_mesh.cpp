@@ -223,12 +223,13 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
       loop.steps = std::max<int64_t>(1, std::llround(static_cast<double>(steps) * config.backgroundShare));
     }
     shareLeft -= plan.share;
-    const double pixels = plan.start.pixels();
+    const double pixels = plan.start.pixels(), through = plan.start.through.total();
     if (startsAtSurface(plan.part))
       plan.start.displacements = survey->findDisplacements(plan.part, config.domain(plan.part, 0));
     MeshTrainer trainer(device, capture, config, plan.part, std::move(plan.start));
     if (config.exposure) trainer.useExposures(coarseFile, coarseState);
-    inform("{}: {:.0f} pixels of the photos show it", plan.part.name, pixels);
+    inform("{}: {:.0f} pixels of the photos show it{}", plan.part.name, pixels,
+           through > 0 ? fmt::format(", {:.0f} only what is behind it", through) : "");
     fs::create_directories(folder.root());
     const TrainingResult result = runTraining(trainer, folder, loop);
     writeMeshManifest(model, parts);
