@@ -148,6 +148,7 @@ bool MeshModel::allFinite() {
   bool finite = true;
   for (ParameterGroup* group : sharedGroups()) finite = finite && group->allFinite(device_);
   for (const auto& level : levels_) finite = finite && level->displacements().allFinite(device_);
+  for (const CoarseAtlas& coarse : coarse_) finite = finite && coarse.texels.allFinite(device_);
   return finite;
 }
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <set>
 
 #include "representations/field/testing/trained_cube.h"
 #include "representations/mesh/testing/small_mesh.h"
@@ -167,29 +166,6 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   EXPECT_LT(heldOutPsnr(scene, model), before - 3) << "without faces nothing is left";
   model.level(0).keepFaces({});
   EXPECT_EQ(heldOutPsnr(scene, model), before);
-}
-
-TEST(FaceSet, ListsTheFacesThatShareAnEdge) {
-  OctahedraGrid grid;
-  grid.resolution = 6;
-  const std::vector<OctahedraGrid> grids = {grid};
-  FaceSet set(grids);
-  const uint32_t cell = 2 + 6 * (3 + 6 * 3), face = kFacesPerCell * cell + kOuterFaces;  // an inner face
-  set.add(face);
-  const FaceSet neighbours = set.neighbours(grids);
-  EXPECT_FALSE(neighbours.contains(face));
-  std::set<std::array<int, 3>> corners;
-  for (const auto& corner : octahedronFace(kOuterFaces)) corners.insert(corner);
-  size_t ofTheSame = 0;
-  for (uint32_t local = 0; local < kFacesPerCell; ++local) {
-    size_t shared = 0;
-    for (const auto& corner : octahedronFace(local)) shared += corners.count(corner);
-    EXPECT_EQ(neighbours.contains(kFacesPerCell * cell + local), shared == 2) << local;
-    ofTheSame += shared == 2 ? 1 : 0;
-  }
-  EXPECT_GT(neighbours.count(), ofTheSame) << "those of other octahedra at the outer edge";
-  EXPECT_LT(neighbours.count(), 3u * kFacesPerCell);
-  EXPECT_EQ(FaceSet(grids).neighbours(grids).count(), 0u);
 }
 
 TEST(Extraction, CountsThePixelsThatFacesDoNotCover) {

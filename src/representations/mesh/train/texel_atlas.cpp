@@ -86,38 +86,36 @@ void TexelAtlas::addPatch(const OctahedraDomain& domain, const TriangleList& lis
   }
 }
 
-std::vector<float> TexelAtlas::encodeTexels(MeshModel& model) const {
+void TexelAtlas::forEachOutput(MeshModel& model,
+                               const std::function<void(uint32_t, const std::vector<float>&)>& use) const {
   constexpr uint32_t kFeatures = MeshField::kFeatures;
   Device& device = model.device();
   model.field().reserve(kTexelsAtATime);
   Array<float> features = device.array<float>(size_t{kFeatures} * kTexelsAtATime);
-  std::vector<float> all;
   for (uint32_t first = 0; first < texels_; first += kTexelsAtATime) {
     const uint32_t count = std::min(kTexelsAtATime, texels_ - first);
     model.field().encode({count}, positions_.part(size_t{3} * first, size_t{3} * count),
                          Matrix<float>(features, kFeatures));
-    const std::vector<float> some = device.read(features.part(0, size_t{kFeatures} * count));
-    all.insert(all.end(), some.begin(), some.end());
+    use(first, device.read(features.part(0, size_t{kFeatures} * count)));
   }
+}
+
+std::vector<float> TexelAtlas::encodeTexels(MeshModel& model) const {
+  std::vector<float> all;
+  forEachOutput(model,
+                [&](uint32_t, const std::vector<float>& some) { all.insert(all.end(), some.begin(), some.end()); });
   return all;
 }
 
 std::vector<float> TexelAtlas::findRanges(MeshModel& model) const {
   constexpr uint32_t kFeatures = MeshField::kFeatures;
-  Device& device = model.device();
-  model.field().reserve(kTexelsAtATime);
-  Array<float> features = device.array<float>(size_t{kFeatures} * kTexelsAtATime);
   std::vector<float> ranges;
   for (uint32_t f = 0; f < kFeatures; ++f) {
     ranges.push_back(std::numeric_limits<float>::infinity());
     ranges.push_back(-std::numeric_limits<float>::infinity());
   }
-  for (uint32_t first = 0; first < texels_; first += kTexelsAtATime) {
-    const uint32_t count = std::min(kTexelsAtATime, texels_ - first);
-    model.field().encode({count}, positions_.part(size_t{3} * first, size_t{3} * count),
-                         Matrix<float>(features, kFeatures));
-    const std::vector<float> some = device.read(features.part(0, size_t{kFeatures} * count));
-    for (size_t texel = 0; texel < count; ++texel) {
+  forEachOutput(model, [&](uint32_t first, const std::vector<float>& some) {
+    for (size_t texel = 0; texel < some.size() / kFeatures; ++texel) {
       const uint32_t number = first + static_cast<uint32_t>(texel), within = number % (patchEdge_ * patchEdge_);
       if (!isTexelUsed(pairs_[number / (patchEdge_ * patchEdge_)], within % patchEdge_, within / patchEdge_,
                        patchEdge_))
@@ -129,7 +127,7 @@ std::vector<float> TexelAtlas::findRanges(MeshModel& model) const {
         ranges[2 * f + 1] = std::max(ranges[2 * f + 1], some[kFeatures * texel + f]);
       }
     }
-  }
+  });
   for (uint32_t f = 0; f < kFeatures; ++f)
     if (!(ranges[2 * f] <= ranges[2 * f + 1])) ranges[2 * f] = ranges[2 * f + 1] = 0;
   return ranges;

@@ -2,6 +2,8 @@
 // training.
 #pragma once
 
+#include <functional>
+
 #include "representations/mesh/train/mesh_model.h"
 #include "representations/mesh/train/mesh_patches.h"
 
@@ -25,6 +27,8 @@ class TexelAtlas {
   std::vector<float> findRanges(MeshModel& model) const;
 
  private:
+  // Calls use(number of the first texel, features) for some texels at a time, in order.
+  void forEachOutput(MeshModel& model, const std::function<void(uint32_t, const std::vector<float>&)>& use) const;
   void addPatch(const OctahedraDomain& domain, const TriangleList& list, const TrianglePatch& patch,
                 std::vector<uint32_t>& patchOfFace, std::vector<float>& factors, std::vector<float>& positions);
 
