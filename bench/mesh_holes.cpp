@@ -26,8 +26,8 @@ namespace {
 class BlocksDrawer final : public CpuDrawer {
  public:
   uint64_t residentBytes(uint64_t decodedBytes) const override { return drawer_->residentBytes(decodedBytes); }
-  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
-    return drawer_->prepare(std::move(content));
+  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content, int threads) const override {
+    return drawer_->prepare(std::move(content), threads);
   }
   RenderedView draw(const SceneView<Content>& view, const ViewRequest& request, const DrawSettings& settings,
                     ThreadPool& pool, DrawCounts& counts) override {

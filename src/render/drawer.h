@@ -75,8 +75,9 @@ class CpuDrawer {
   virtual uint64_t residentBytes(uint64_t decodedBytes) const { return decodedBytes; }
   // Returns the same for a shared resource, which is counted once for all contents that use it.
   virtual uint64_t residentBytesOfResource(uint64_t decodedBytes) const { return decodedBytes; }
-  // Turns a decoded content into one that draw() accepts. Called by several threads at a time.
-  virtual std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const { return content; }
+  // Turns a decoded content into one that draw() accepts. Called by several threads at a time. `threads`: of its own
+  // work on the content; 0: as many as the machine has.
+  virtual std::unique_ptr<Content> prepare(std::unique_ptr<Content> content, int /*threads*/) const { return content; }
 
   // Renders a view (see ViewRenderer::render). The image does not depend on the number of threads. Adds to `counts`.
   virtual RenderedView draw(const SceneView<Content>& view, const ViewRequest& request, const DrawSettings& settings,

@@ -10,12 +10,12 @@
 namespace tessera {
 namespace {
 
-TileSource<Content> preparedBy(const CpuDrawer& drawer, TileSource<Content> source) {
+TileSource<Content> preparedBy(const CpuDrawer& drawer, TileSource<Content> source, int threads) {
   source.bytes = [&drawer, bytes = source.bytes](int tile) { return drawer.residentBytes(bytes(tile)); };
   source.bytesOfResource = [&drawer, bytes = source.bytesOfResource](int resource) {
     return drawer.residentBytesOfResource(bytes(resource));
   };
-  source.load = [&drawer, load = source.load](int tile) { return drawer.prepare(load(tile)); };
+  source.load = [&drawer, threads, load = source.load](int tile) { return drawer.prepare(load(tile), threads); };
   return source;
 }
 
@@ -24,7 +24,8 @@ TileSource<Content> preparedBy(const CpuDrawer& drawer, TileSource<Content> sour
 SceneRenderer::SceneRenderer(std::unique_ptr<CpuDrawer> drawer, const TileFrame& frame, TileTree tree,
                              TileSource<Content> source, const SceneRendererSettings& settings)
     : drawer_(std::move(drawer)),
-      tiles_(frame, std::move(tree), preparedBy(*drawer_, std::move(source)), settings.selection, settings.budgetBytes),
+      tiles_(frame, std::move(tree), preparedBy(*drawer_, std::move(source), settings.threads), settings.selection,
+             settings.budgetBytes),
       settings_(settings),
       pool_(settings.threads) {
   const std::vector<std::string_view> modes = drawer_->skippingModes();

@@ -13,7 +13,7 @@ namespace {
 
 // Records the calls to a drawer.
 struct Asked {
-  int prepared = 0;
+  int prepared = 0, preparingThreads = -1;
   std::vector<int> drawn;  // tiles of the last image, in the order in which they were passed
   bool allWerePrepared = true;
   int pinned = -1;
@@ -28,12 +28,13 @@ class AskedDrawer final : public CpuDrawer {
 
   uint64_t residentBytes(uint64_t decodedBytes) const override { return 3 * decodedBytes; }
   uint64_t residentBytesOfResource(uint64_t decodedBytes) const override { return 2 * decodedBytes; }
-  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
+  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content, int threads) const override {
     auto& numbered = static_cast<NumberedContent&>(*content);
     EXPECT_FALSE(numbered.prepared);
     numbered.prepared = true;
     numbered.bytes = preparedBytes_;
     ++asked_->prepared;
+    asked_->preparingThreads = threads;
     return content;
   }
   RenderedView draw(const SceneView<Content>& view, const ViewRequest& request, const DrawSettings& settings,
@@ -79,7 +80,10 @@ class SceneRendererTest : public testing::Test {
 };
 
 TEST_F(SceneRendererTest, DrawsContentsThatItsDrawerHasPreparedOnce) {
-  SceneRenderer renderer = rendererWith(within(kAll));
+  SceneRendererSettings settings = within(kAll);
+  settings.threads = 3;
+  SceneRenderer renderer = rendererWith(settings);
+  EXPECT_EQ(asked_.preparingThreads, 3);
   EXPECT_EQ(asked_.prepared, 1) << "the root, which always is in memory";
   for (int picture = 0; picture < 2; ++picture) renderer.render(place_.camera(), place_.above(), nullptr);
   std::sort(asked_.drawn.begin(), asked_.drawn.end());

@@ -77,12 +77,12 @@ class MeshDrawer final : public CpuDrawer {
   uint64_t residentBytes(uint64_t decodedBytes) const override { return 3 * decodedBytes + (1 << 20); }
   // While a content is prepared, its encoder is also in memory in float32.
   uint64_t residentBytesOfResource(uint64_t decodedBytes) const override { return 3 * decodedBytes; }
-  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
+  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content, int threads) const override {
     auto* decoded = dynamic_cast<ContentOf<MeshContent>*>(content.get());
     CHECK(decoded != nullptr);
     if (!decoded->value.encoders.empty()) {
       const std::lock_guard lock(inferring_);
-      const std::unique_ptr<Device> device = makeCpuDevice();
+      const std::unique_ptr<Device> device = makeCpuDevice(threads);
       MeshContent& mesh = decoded->value;
       for (uint32_t resource = 0; resource < mesh.encoders.size(); ++resource) {
         MapInference inference(*device, mesh.encoders[resource]->encoder);

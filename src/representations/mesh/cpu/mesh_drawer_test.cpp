@@ -41,7 +41,7 @@ PatchSet squareSet(double x0, double y0, double x1, double y1, double height, fl
 class DrawMesh : public testing::Test {
  protected:
   const Content* prepare(MeshContent mesh) {
-    contents_.push_back(drawer_->prepare(makeContent(std::move(mesh))));
+    contents_.push_back(drawer_->prepare(makeContent(std::move(mesh)), 1));
     return contents_.back().get();
   }
   // The colour, opacity and depth seen straight down from (x, y, 10).
