@@ -1,6 +1,8 @@
 #include "partition/heights.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
 #include "partition/cameras.h"
 
@@ -14,6 +16,32 @@ constexpr size_t kTogether = 3;         // number of points that must follow wit
 constexpr double kMinThickness = 0.02;  // relative to the region's longer side, for flat ground
 constexpr double kAround = 0.05;        // relative to the region's longer side: points up to here outside it count
 constexpr double kBelowGround = 0.1;    // relative to the flight height, used where there are no points
+constexpr int kSquares = 12;            // along each side of the region
+constexpr double kBareShare = 0.1;      // of these squares: with more without points, the points do not show the top
+constexpr double kTreeTops = 0.25;      // relative to the flight height: the top reaches up to there then
+
+// Returns the share of the region's squares in which there is no point: in woods and on water, photos have hardly any
+// features that match.
+double findBareShare(const std::vector<SparsePoint>& points, const Ground& ground, const Rectangle& region) {
+  std::array<bool, size_t{kSquares} * kSquares> hasPoints{};
+  for (const SparsePoint& point : points) {
+    const Vec2d at = region.inside(ground.inGround(point.xInWorld).head<2>());
+    const auto square = [](double x, double length) {
+      return static_cast<int>(std::floor((x / length + 0.5) * kSquares));
+    };
+    const int column = square(at.x(), region.width), row = square(at.y(), region.depth);
+    if (column >= 0 && column < kSquares && row >= 0 && row < kSquares)
+      hasPoints[static_cast<size_t>(row) * kSquares + static_cast<size_t>(column)] = true;
+  }
+  const auto bare = std::count(hasPoints.begin(), hasPoints.end(), false);
+  return static_cast<double>(bare) / static_cast<double>(hasPoints.size());
+}
+
+// Returns the height of the lowest cameras above the ground.
+double findFlightHeight(std::vector<double> cameras) {
+  std::erase_if(cameras, [](double height) { return !(height > 0); });  // below the ground
+  return cameras.empty() ? 0 : percentile(cameras, 0.05);
+}
 
 }  // namespace
 
@@ -45,15 +73,16 @@ Heights findHeights(const Capture& capture, const Ground& ground, const Region& 
     if (region.looksAtGround)
       extent = {std::min(extent.bottom, 0.0), std::clamp(extent.top, 0.0, std::max(highest, 0.0))};
   } else if (region.looksAtGround) {
-    std::erase_if(cameras, [](double height) { return !(height > 0); });  // below the ground
-    const double lowest = percentile(cameras, 0.05);
-    extent = {-kBelowGround * lowest, lowest};
+    const double flight = findFlightHeight(cameras);
+    extent = {-kBelowGround * flight, flight};
   } else {
     const double middle = ground.inGround(findFocusPoint(capture, photos)).z();
     extent = {middle - side / 2, middle + side / 2};
   }
   const double missing = kMinThickness * side - (extent.top - extent.bottom);
   if (missing > 0) extent = {extent.bottom - missing / 2, extent.top + missing / 2};
+  if (region.looksAtGround && findBareShare(capture.points, ground, region.rectangle) > kBareShare)
+    extent.top = std::max(extent.top, kTreeTops * findFlightHeight(std::move(cameras)));
   return extent;
 }
 

@@ -13,10 +13,20 @@ Heights findCaptureHeights(const Capture& capture) {
 
 TEST(Heights, ReachATenthBeyondTheMiddleOfThePoints) {
   Capture capture = flight(6, 6, 20, 60);
-  addPoints(capture, 20000, {0, 0, -1}, {100, 100, 9});
+  addPoints(capture, 20000, {-60, -60, -1}, {160, 160, 9});
   const Heights heights = findCaptureHeights(capture);
   EXPECT_NEAR(heights.bottom, -2, 0.1);
   EXPECT_NEAR(heights.top, 10, 0.1);
+}
+
+TEST(Heights, LeaveRoomForTreesWhereThereAreNoPoints) {
+  Capture capture = flight(6, 6, 20, 60);
+  const Rectangle region = findRegion(capture, Ground{}).rectangle;
+  const Vec2d low = region.centre - Vec2d(region.width, region.depth) / 2, high = 2 * region.centre - low;
+  addPoints(capture, 20000, {low.x(), low.y(), -1}, {region.centre.x(), high.y(), 9}, 1);
+  EXPECT_NEAR(findCaptureHeights(capture).top, 15, 1e-9) << "a quarter of the flight height";
+  addPoints(capture, 20000, {region.centre.x(), low.y(), -1}, {high.x(), high.y(), 9}, 2);
+  EXPECT_NEAR(findCaptureHeights(capture).top, 10, 0.1);
 }
 
 TEST(Heights, DoNotCutOffALoneTower) {
@@ -64,7 +74,7 @@ TEST(Heights, ReachAboveCamerasInsideTheScene) {
 
 TEST(Heights, OnlyCountPointsOfTheRegion) {
   Capture capture = flight(6, 6, 20, 60);
-  addPoints(capture, 3000, {0, 0, -1}, {100, 100, 9}, 1);
+  addPoints(capture, 3000, {-60, -60, -1}, {160, 160, 9}, 1);
   addPoints(capture, 3000, {1000, 1000, -50}, {1100, 1100, 50}, 2);  // hills far away
   const Heights heights = findCaptureHeights(capture);
   EXPECT_LT(heights.top, 11);
