@@ -16,6 +16,8 @@
 #   quads        one block of octahedra and of MobileNeRF's quads, in the same time, three seeds; also with equal numbers of
 #                triangles, without the final stage
 #   depth        one block with and without the loss of depths at sparse points, three seeds: errors of depth, PSNR
+#   traffic      one block of a city with cars that move, in the same time: with their masks, with `transient=auto` and without
+#                masks, in the held-out photos of the same city without cars; how well the masks that training makes match the true ones
 #   borders      the error of the city's scene near walls between blocks against that elsewhere, and the same of a scene with one
 #                block in place of four
 #   processes    four blocks as four processes and one after another: equal bytes
@@ -410,6 +412,45 @@ holes() {
   done
 }
 
+# withoutMasks FROM TO: copies a capture without its masks.
+withoutMasks() {
+  rm -rf "$2.part"
+  cp -r "$1" "$2.part"
+  rm -r "$2.part/masks"
+  jq 'del(.frames[].mask_path)' "$1/transforms.json" > "$2.part/transforms.json"
+  mv "$2.part" "$2"
+}
+
+traffic() {
+  need_tessera
+  local program=build/release/bench/mesh_transients file=$work/transients.json size="--blocks 1x1 --photos 60 --size 320x240"
+  local -A capture=([given]=traffic-masked [auto]=traffic [none]=traffic)
+  local name
+  [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_transients"
+  [ -e "$work/traffic-clean/transforms.json" ] || "$tessera" synth city "$work/traffic-clean" $size
+  [ -e "$work/traffic-masked/transforms.json" ] || "$tessera" synth city "$work/traffic-masked" $size --traffic
+  [ -e "$work/traffic/transforms.json" ] || withoutMasks "$work/traffic-masked" "$work/traffic"
+  for name in given auto none; do
+    trained "traffic-$name" "${capture[$name]}" --method mesh --minutes 5 \
+      --set transient="$([ "$name" = auto ] && echo auto || echo none)"
+    counted "traffic-$name" "${capture[$name]}"
+    echo "traffic, $name: $(judged "traffic-$name.scene" traffic-clean 0) dB"
+    if [ -x build/release/bench/mesh_classes ]; then
+      build/release/bench/mesh_classes "$work/traffic-$name.scene" "$work/traffic-clean" |
+        jq -r --arg name "$name" '"traffic, \($name), pixels of the ground: \(.[0].ground.psnr) dB"'
+    fi
+  done
+  if [ ! -s "$file" ]; then
+    "$program" "$work/traffic-auto" "$work/traffic" "$work/traffic-masked" "$work/traffic-clean" > "$file.part"
+    mv "$file.part" "$file"
+  fi
+  jq -c . "$file"
+  verdict "traffic, transient=auto against given masks, loss in dB" "$(shortfall "$(judged traffic-given.scene traffic-clean 0)" \
+    "$(judged traffic-auto.scene traffic-clean 0)")" '<=' 0.5
+  verdict "traffic, gain of transient=auto in dB" "$(shortfall "$(judged traffic-auto.scene traffic-clean 0)" \
+    "$(judged traffic-none.scene traffic-clean 0)")" '>=' 0
+}
+
 # pictures: renders the views of the fallback in all programs, and compares them.
 pictures() {
   local program=build/release/bench/mesh_fallback folder=$work/fallback scene=$work/city-mesh.scene needed uri
@@ -483,7 +524,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city levels final holes losses quads depth borders processes killed vulkan fallback yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses quads depth traffic borders processes killed vulkan fallback yardstick fox beach}; do
   "$row"
 done
 finish

@@ -15,6 +15,7 @@
 #include "representations/mesh/content/fallback_mesh.h"
 #include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/content/mesh_payload.h"
+#include "representations/mesh/train/transient_masks.h"
 
 namespace tessera {
 namespace {
@@ -69,7 +70,8 @@ class MeshBaker final : public Baker {
     return {kMeshName, grid_, mesh_.parts.front()->config().near * tilesPerBlock_, kHazySky};
   }
 
-  void bake(const Capture& capture, const BakeOptions& options, ContentSink& sink) override {
+  void bake(const Capture& given, const BakeOptions& options, ContentSink& sink) override {
+    const Capture capture = applyTransientMasks(given, mesh_.folder);
     options_ = options;
     sink_ = &sink;
     placeOn(frame_, grid_);

@@ -36,6 +36,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       coarseStepsSetting(),
       coarseShareSetting(),
       backgroundShareSetting(),
+      transientSetting(),
       gridLevelsSetting().byDefault(16).within(1, 128 / std::max(1, gridFeatures)),
       gridFeaturesSetting(),
       gridLog2SizeSetting(),
@@ -90,6 +91,8 @@ void MeshConfig::check() const {
   ofPreset(preset);
   MeshConfig checked = *this;
   requireWithinBounds(checked.fields());
+  if (transient != "auto" && transient != "none")
+    throw Error("--set transient=" + transient, "", "a mesh does not know this value", "use auto or none");
   if (backgroundBlock == "own" || backgroundBlock == "none") return;
   throw Error("--set background_block=" + backgroundBlock, "", "a mesh has no such background block",
               "use own or none");

@@ -31,6 +31,10 @@ struct MeshConfig : BackgroundBlockSettings,
   SETTING(double, coarseShare, 0.15, "coarse_share", "share of --minutes for the coarse field", within(0.01, 0.9));
   SETTING(double, backgroundShare, 0.15, "background_share",
           "share of --minutes, at most, or of the steps, for the background block", within(0.01, 0.9));
+  SETTING(std::string, transient, "none", "transient",
+          "what moves between photos, such as cars: auto (the parts are not trained on pixels that deviate from what "
+          "other photos show at the same place) or none (photos are used as they are)",
+          anything());
   // Model
   SETTING(int, gridFeatures, 2, "grid_features", "features per hash entry", allowedValues({1, 2, 4, 8}));
   SETTING(int, meshCells, 64, "mesh_cells", "cells along an edge of a block's grid of octahedra",
@@ -103,6 +107,7 @@ struct MeshConfig : BackgroundBlockSettings,
   MeshFieldShape shape() const;
   // The number of levels: meshLevels, or as many as have a multiple of 4 cells along an edge, at least 8.
   uint32_t levels() const;
+  bool leavesTransientsOut() const { return transient == "auto"; }
   bool hasBackground() const { return backgroundBlock == "own"; }
   // The number of steps before the final stage; 0 if the number of all is unknown.
   int64_t stepsBeforeFinalStage(int64_t plannedSteps) const;

@@ -16,6 +16,16 @@ TEST(MeshConfig, HasPresetsThatCanBeTrained) {
   EXPECT_THROW(MeshConfig::ofPreset("gpu"), Error);
 }
 
+TEST(MeshConfig, KnowsTwoWaysToTreatWhatMoves) {
+  MeshConfig config;
+  EXPECT_FALSE(config.leavesTransientsOut());
+  config.transient = "auto";
+  EXPECT_NO_THROW(config.check());
+  EXPECT_TRUE(config.leavesTransientsOut());
+  config.transient = "always";
+  EXPECT_THROW(config.check(), Error);
+}
+
 TEST(MeshConfig, HasThePapersSizesInThePaperPreset) {
   const MeshConfig paper = MeshConfig::ofPreset("paper");
   const MlpShape encoder = paper.shape().encoder;

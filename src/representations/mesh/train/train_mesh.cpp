@@ -11,6 +11,7 @@
 #include "base/log.h"
 #include "representations/field/train/train_field.h"
 #include "representations/mesh/train/trained_mesh.h"
+#include "representations/mesh/train/transient_masks.h"
 #include "train/colour_loss.h"
 #include "train/run_folder.h"
 
@@ -153,13 +154,13 @@ std::vector<PlannedPart> planParts(const Capture& capture, const std::vector<Mes
 
 }  // namespace
 
-TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path& model, TrainMeshOptions options) {
+TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& model, TrainMeshOptions options) {
   const Stopwatch stopwatch;
   MeshConfig& config = options.config;
   config.check();
   colourLossKind(config.loss);  // throws Error
   options.loop.method = "mesh";
-  const BlockRun run = openBlockRun(capture, model, options, partitionRequirements(config));
+  const BlockRun run = openBlockRun(given, model, options, partitionRequirements(config));
   config.photoBudgetMiB = run.photoBudgetMiB;
   const std::vector<MeshPart> parts = makeMeshParts(run.grid, config.hasBackground());
   requireParts(options.only, parts);
@@ -170,16 +171,19 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
     };
     for (const MeshPart& part : parts) removeModel(partFolder(model, part));
     if (!options.loop.resume) removeModel(coarseFolder(model));
+    if (!options.loop.resume) removeTransientMasks(model);
     if (!options.loop.resume) fs::remove(model / "run.json");
     keepLength(model, options.loop);
     writeFileAtomically(run.folder.configPath(), reproductionHeader(device, options.loop, " --grid blocks.json") +
                                                      configToToml(config.fields()));
-    run.folder.writePlacement({{}, run.grid, capture.sourceFromWorld, capture.root, trainingNames(capture)}, "mesh");
+    run.folder.writePlacement({{}, run.grid, given.sourceFromWorld, given.root, trainingNames(given)}, "mesh");
     writeMeshManifest(model, parts);  // from now on, --resume takes settings and blocks from this folder
   } else {
     keepLength(model, options.loop);
   }
-  if (!trainCoarseField(device, capture, model, options)) return {};
+  if (!trainCoarseField(device, given, model, options)) return {};
+  if (config.leavesTransientsOut() && !haveTransientMasks(model))
+    makeTransientMasks(given, *loadFieldModel(device, coarseFolder(model).root()), model);
   writeMeshManifest(model, parts);
   const auto isRequested = [&](const std::string& name) {
     return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
@@ -191,6 +195,9 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
     return sum;  // only the coarse field
   }
 
+  std::optional<Capture> withoutTransients;
+  if (config.leavesTransientsOut()) withoutTransients = applyTransientMasks(given, model);
+  const Capture& capture = withoutTransients ? *withoutTransients : given;
   // Vertices start at the surface only in blocks whose training begins now.
   const auto startsAtSurface = [&](const MeshPart& part) {
     return config.surfaceStart && !part.isBackground() && isRequested(part.name) && !partFolder(model, part).manifest();

@@ -11,7 +11,7 @@ TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder) {
   requireManifest(root, "mesh");
   MeshConfig config;
   configFromToml(config.fields(), root.configPath());
-  TrainedMesh mesh{&device, requireGrid(root), {}};
+  TrainedMesh mesh{&device, requireGrid(root), {}, folder};
   for (const MeshPart& part : makeMeshParts(mesh.grid, config.hasBackground())) {
     const ModelFolder trained = partFolder(folder, part);
     const std::optional<ModelManifest> manifest = trained.manifest();

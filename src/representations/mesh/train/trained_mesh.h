@@ -21,6 +21,7 @@ struct TrainedMesh {
   Device* device;
   BlockGrid grid;
   std::vector<std::unique_ptr<MeshModel>> parts;  // those that have been trained, the outside last
+  fs::path folder;
 };
 
 // Loads a trained mesh for rendering. Throws Error if its files are missing or malformed, or if no part has been

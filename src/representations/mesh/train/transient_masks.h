@@ -1,0 +1,35 @@
+// The masks of what moves in the training photos of a mesh, in the folder `transient` of its model. They are made once,
+// from the coarse field, and the same for all parts and processes.
+#pragma once
+
+#include "base/file.h"
+#include "representations/field/train/field_model.h"
+#include "representations/mesh/train/transient_pixels.h"
+#include "scene/capture.h"
+
+namespace tessera {
+
+// The training photos of a capture beside the coarse field, in their order.
+struct ComparedPhotos {
+  std::vector<ComparedPhoto> photos;
+  double pixelWidth = 0;  // on the surfaces that they show, the median, scene units
+};
+// Compares every second pixel along both axes, or fewer of large photos. Pixels that a mask excludes have no point.
+// Throws Error if a photo or its mask cannot be read.
+ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse);
+// Returns the settings that suit these photos.
+TransientSettings chooseTransientSettings(const ComparedPhotos& compared);
+
+// Writes the masks of the training photos that show something transient, with what the photos' own masks exclude, and
+// logs the share of the pixels that the photos' own masks do not exclude. Other processes may write the same masks at
+// the same time. Throws Error as comparePhotos does, or if a file cannot be written.
+void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh);
+// Whether all masks have been written.
+bool haveTransientMasks(const fs::path& mesh);
+void removeTransientMasks(const fs::path& mesh);
+
+// Returns the capture with these masks in place of the photos' own; unchanged if there are none. Throws Error if their
+// list is malformed.
+Capture applyTransientMasks(Capture capture, const fs::path& mesh);
+
+}  // namespace tessera
