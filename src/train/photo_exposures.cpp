@@ -19,6 +19,13 @@ void PhotoExposures::settle(int64_t step, bool train) {
   if (train && step % 16 == 15) centre();
 }
 
+void PhotoExposures::restoreFirst(const fs::path& path, const Safetensors& file, size_t photos) {
+  ParameterGroup first(device_, group_.name, std::vector<float>(3 * photos), false);
+  loadGroup(device_, path, file, first);
+  const std::vector<float> gains = device_.read(first.values.all());
+  device_.write(group_.values.part(0, gains.size()), std::span<const float>(gains));
+}
+
 void PhotoExposures::centre() {
   std::vector<float> gains = device_.read(group_.values.all());
   for (int channel = 0; channel < 3; ++channel) {

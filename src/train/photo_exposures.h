@@ -25,6 +25,8 @@ class PhotoExposures {
   bool allFinite() const { return group_.allFinite(device_); }
   void save(TensorSet& tensors) { tensors.add(device_, group_, true); }
   void restore(const fs::path& path, const Safetensors& file) { loadGroup(device_, path, file, group_); }
+  // Restores the exposures of the first `photos` from a training on these alone; the others stay as they are.
+  void restoreFirst(const fs::path& path, const Safetensors& file, size_t photos);
 
  private:
   Device& device_;

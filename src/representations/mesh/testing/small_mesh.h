@@ -22,6 +22,7 @@ inline MeshConfig smallMeshConfig() {
   config.maxRays = 4096;
   config.learningRate = 2e-2;
   config.exposure = false;
+  config.enoughPhotos = 0;
   return config;
 }
 

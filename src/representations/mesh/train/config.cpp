@@ -21,6 +21,7 @@ MeshConfig MeshConfig::ofPreset(const std::string& name) {
   config.surfaceStart = false;
   config.networkL2 = config.distortionWeight = config.throughShare = config.finalShare = config.droppedShare = 0;
   config.exposure = false;
+  config.enoughPhotos = 0;
   config.patchTexels = 32;
   return config;
 }
@@ -37,6 +38,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       coarseShareSetting(),
       backgroundShareSetting(),
       transientSetting(),
+      enoughPhotosSetting(),
       gridLevelsSetting().byDefault(16).within(1, 128 / std::max(1, gridFeatures)),
       gridFeaturesSetting(),
       gridLog2SizeSetting(),

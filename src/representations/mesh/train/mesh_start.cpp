@@ -11,7 +11,6 @@ namespace tessera {
 namespace {
 
 constexpr int kPhotoStride = 3;  // pixels, of the rays that find surfaces
-constexpr int kTileEdge = 8;     // pixels
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 // Returns the distances at which a ray is in a box around the origin; an empty interval if it misses it.

@@ -10,6 +10,8 @@ namespace tessera {
 
 class FieldRenderer;
 
+inline constexpr int kTileEdge = 8;  // pixels of a photo; the middle of each tile is looked at
+
 // Where the training of one part starts.
 struct MeshStart {
   std::vector<bool> cells;           // [cells of the lattice] of the finest level

@@ -16,8 +16,11 @@ class MeshTrainer final : public TrainableModel {
   // Keeps references to `device` and `capture`. Trains on the capture's training photos.
   MeshTrainer(Device& device, const Capture& capture, const MeshConfig& config, const MeshPart& part, MeshStart start);
   // Compares with photos at the exposures that a checkpoint of the coarse field holds, which are the same for all parts
-  // and are not trained further. Throws Error if it holds none of these photos.
-  void useExposures(const fs::path& path, const Safetensors& coarse) { photoLoss_.exposures().restore(path, coarse); }
+  // and are not trained further. It holds those of the first `photos` of the capture; the others have neutral
+  // exposures. Throws Error if it holds another number.
+  void useExposures(const fs::path& path, const Safetensors& coarse, size_t photos) {
+    photoLoss_.exposures().restoreFirst(path, coarse, photos);
+  }
 
   StepReport step(int64_t step, int64_t plannedSteps) override;
   Bytes save(uint32_t part) override;

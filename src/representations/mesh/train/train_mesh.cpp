@@ -12,6 +12,7 @@
 #include "representations/field/train/train_field.h"
 #include "representations/mesh/train/trained_mesh.h"
 #include "representations/mesh/train/transient_masks.h"
+#include "representations/mesh/train/views_between.h"
 #include "train/colour_loss.h"
 #include "train/run_folder.h"
 
@@ -115,6 +116,20 @@ bool trainCoarseField(Device& device, const Capture& capture, const fs::path& mo
   return trainField(device, capture, folder.root(), {coarse, loop}).finished;
 }
 
+uint64_t viewSeed(const MeshConfig& config) {
+  return static_cast<uint64_t>(config.seed);
+}
+
+// Makes what the parts are trained with beside the photos, unless it has been made.
+void compareWithCoarseField(Device& device, const Capture& capture, const fs::path& model, const MeshConfig& config) {
+  const bool needsMasks = config.leavesTransientsOut() && !haveTransientMasks(model);
+  const bool needsViews = config.enoughPhotos > 0 && !haveViewsBetween(model);
+  if (!needsMasks && !needsViews) return;
+  const auto coarse = loadFieldModel(device, coarseFolder(model).root());
+  if (needsMasks) makeTransientMasks(capture, *coarse, model);
+  if (needsViews) makeViewsBetween(capture, *coarse, model, config.enoughPhotos, viewSeed(config));
+}
+
 // A part that is to be trained, with its share of the time that remains.
 struct PlannedPart {
   MeshPart part;
@@ -172,6 +187,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     for (const MeshPart& part : parts) removeModel(partFolder(model, part));
     if (!options.loop.resume) removeModel(coarseFolder(model));
     if (!options.loop.resume) removeTransientMasks(model);
+    if (!options.loop.resume) removeViewsBetween(model);
     if (!options.loop.resume) fs::remove(model / "run.json");
     keepLength(model, options.loop);
     writeFileAtomically(run.folder.configPath(), reproductionHeader(device, options.loop, " --grid blocks.json") +
@@ -182,8 +198,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     keepLength(model, options.loop);
   }
   if (!trainCoarseField(device, given, model, options)) return {};
-  if (config.leavesTransientsOut() && !haveTransientMasks(model))
-    makeTransientMasks(given, *loadFieldModel(device, coarseFolder(model).root()), model);
+  compareWithCoarseField(device, given, model, config);
   writeMeshManifest(model, parts);
   const auto isRequested = [&](const std::string& name) {
     return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
@@ -195,9 +210,8 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     return sum;  // only the coarse field
   }
 
-  std::optional<Capture> withoutTransients;
-  if (config.leavesTransientsOut()) withoutTransients = applyTransientMasks(given, model);
-  const Capture& capture = withoutTransients ? *withoutTransients : given;
+  const Capture capture = addViewsBetween(config.leavesTransientsOut() ? applyTransientMasks(given, model) : given,
+                                          model, viewSeed(config));
   // Vertices start at the surface only in blocks whose training begins now.
   const auto startsAtSurface = [&](const MeshPart& part) {
     return config.surfaceStart && !part.isBackground() && isRequested(part.name) && !partFolder(model, part).manifest();
@@ -234,7 +248,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     if (startsAtSurface(plan.part))
       plan.start.displacements = survey->findDisplacements(plan.part, config.domain(plan.part, 0));
     MeshTrainer trainer(device, capture, config, plan.part, std::move(plan.start));
-    if (config.exposure) trainer.useExposures(coarseFile, coarseState);
+    if (config.exposure) trainer.useExposures(coarseFile, coarseState, given.photos.size());
     inform("{}: {:.0f} pixels of the photos show it{}", plan.part.name, pixels,
            through > 0 ? fmt::format(", {:.0f} only what is behind it", through) : "");
     fs::create_directories(folder.root());
