@@ -431,7 +431,7 @@ traffic() {
   [ -e "$work/traffic-masked/transforms.json" ] || "$tessera" synth city "$work/traffic-masked" $size --traffic
   [ -e "$work/traffic/transforms.json" ] || withoutMasks "$work/traffic-masked" "$work/traffic"
   for name in given auto none; do
-    trained "traffic-$name" "${capture[$name]}" --method mesh --minutes 5 \
+    trained "traffic-$name" "${capture[$name]}" --method mesh --blocks 1x1 --minutes 5 \
       --set transient="$([ "$name" = auto ] && echo auto || echo none)"
     counted "traffic-$name" "${capture[$name]}"
     echo "traffic, $name: $(judged "traffic-$name.scene" traffic-clean 0) dB"

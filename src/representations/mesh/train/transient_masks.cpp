@@ -128,10 +128,7 @@ TransientSettings chooseTransientSettings(const ComparedPhotos& compared) {
   return settings;
 }
 
-void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh) {
-  ComparedPhotos compared = comparePhotos(capture, coarse);
-  const TransientSettings settings = chooseTransientSettings(compared);
-  const std::vector<ImageU8> transients = findTransientPixels(std::move(compared.photos), settings);
+void writeTransientMasks(const Capture& capture, const std::vector<ImageU8>& transients, const fs::path& mesh) {
   const std::vector<int> photos = capture.photosIn(Split::train);
   json files = json::object();
   size_t shown = 0, excluded = 0;
@@ -149,6 +146,12 @@ void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::pa
   inform("transient: {:.2f} % of the photos' pixels, in {} of {} photos, show what moves, and are left out",
          100.0 * static_cast<double>(excluded) / static_cast<double>(std::max<size_t>(1, shown)), files.size(),
          photos.size());
+}
+
+void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh) {
+  ComparedPhotos compared = comparePhotos(capture, coarse);
+  const TransientSettings settings = chooseTransientSettings(compared);
+  writeTransientMasks(capture, findTransientPixels(std::move(compared.photos), settings), mesh);
 }
 
 bool haveTransientMasks(const fs::path& mesh) {

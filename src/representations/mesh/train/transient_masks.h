@@ -21,8 +21,11 @@ ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse);
 TransientSettings chooseTransientSettings(const ComparedPhotos& compared);
 
 // Writes the masks of the training photos that show something transient, with what the photos' own masks exclude, and
-// logs the share of the pixels that the photos' own masks do not exclude. Other processes may write the same masks at
-// the same time. Throws Error as comparePhotos does, or if a file cannot be written.
+// logs the share of what these do not exclude. `transients`: as findTransientPixels returns them, for the training
+// photos in their order. Other processes may write the same masks at the same time. Throws Error if a photo's own mask
+// cannot be read, or a file cannot be written.
+void writeTransientMasks(const Capture& capture, const std::vector<ImageU8>& transients, const fs::path& mesh);
+// Finds what is transient, and writes the masks. Throws Error as comparePhotos and writeTransientMasks do.
 void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh);
 // Whether all masks have been written.
 bool haveTransientMasks(const fs::path& mesh);
