@@ -12,6 +12,7 @@ find_package(embree 4 QUIET)  # Debian 13's; Debian 12 has 3
 if(NOT embree_FOUND)
   find_package(embree 3 REQUIRED)
 endif()
+find_package(meshoptimizer REQUIRED)
 find_package(OpenEXR REQUIRED)
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(HWY REQUIRED IMPORTED_TARGET libhwy)

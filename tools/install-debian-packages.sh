@@ -5,7 +5,7 @@ set -euo pipefail
 
 packages=(
   ca-certificates g++ cmake ninja-build ccache pkg-config
-  libhwy-dev libeigen3-dev libembree-dev
+  libhwy-dev libeigen3-dev libembree-dev libmeshoptimizer-dev
   libjpeg62-turbo-dev libspng-dev libwebp-dev libopenexr-dev libexif-dev
   libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev
   libgeographiclib-dev

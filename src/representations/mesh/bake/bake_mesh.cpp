@@ -33,6 +33,19 @@ std::vector<DenseLayer> readDecoder(MeshModel& model) {
   return layers;
 }
 
+// The mean directions in which rays see patches, [patches][3]: from above if no ray does.
+std::vector<float> averageDirections(const TriangleList& list, const std::vector<TrianglePatch>& patches,
+                                     const FaceSet& faces) {
+  std::vector<float> directions;
+  for (const TrianglePatch& patch : patches) {
+    Vec3f sum = faces.direction(list.faceOfTriangle[patch.triangles[0]]);
+    if (patch.isPair) sum += faces.direction(list.faceOfTriangle[patch.triangles[1]]);
+    const Vec3f direction = sum.isZero() ? Vec3f(-Vec3f::UnitZ()) : Vec3f(sum.normalized());
+    directions.insert(directions.end(), direction.begin(), direction.end());
+  }
+  return directions;
+}
+
 // What the field says about a texel.
 struct FieldTexel : MeshTexel {
   std::array<float, 3> colour{};
@@ -42,7 +55,7 @@ struct FieldTexel : MeshTexel {
 class TexelField {
  public:
   TexelField(MeshModel& model, uint32_t level, const TriangleList& list, const std::vector<TrianglePatch>& patches,
-             const FaceSet& faces, const MeshBakeSettings& settings)
+             const std::vector<float>& directions, const MeshBakeSettings& settings)
       : model_(model),
         domain_(model.level(level).domain()),
         list_(list),
@@ -63,15 +76,7 @@ class TexelField {
     std::vector<uint32_t> all(kPlacesAtATime);
     std::iota(all.begin(), all.end(), 0);
     everyPlace_ = device.uploadArray(all);
-    std::vector<float> directions;
-    for (const TrianglePatch& patch : patches) {
-      Vec3f sum = faces.direction(list.faceOfTriangle[patch.triangles[0]]);
-      if (patch.isPair) sum += faces.direction(list.faceOfTriangle[patch.triangles[1]]);
-      const Vec3f direction = sum.isZero() ? Vec3f(-Vec3f::UnitZ()) : Vec3f(sum.normalized());
-      for (int axis = 0; axis < 3; ++axis) directions.push_back(direction[axis]);
-    }
-    if (directions.empty()) directions.resize(3);
-    directions_ = device.uploadArray(directions);
+    directions_ = device.uploadArray(directions.empty() ? std::vector<float>(3) : directions);
   }
 
   // Calls use(texel, what the field says) for all texels, [patches][T][T], in order.
@@ -169,13 +174,14 @@ BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces,
   BakedPatches baked;
   baked.patchEdge = settings.patchEdge;
   baked.decoder = readDecoder(model);
+  baked.directions = averageDirections(list, patches, faces);
   for (const TrianglePatch& patch : patches) {
     baked.pairs += patch.isPair ? 1 : 0;
     for (const uint32_t corner : patch.corners)
       for (int axis = 0; axis < 3; ++axis) baked.vertices.push_back(list.vertices[corner][axis]);
   }
   // The field is evaluated twice: first for the ranges of the features, of what is visible.
-  TexelField field(model, level, list, patches, faces, settings);
+  TexelField field(model, level, list, patches, baked.directions, settings);
   for (auto& range : baked.ranges) {
     range.low = std::numeric_limits<float>::infinity();
     range.high = -range.low;

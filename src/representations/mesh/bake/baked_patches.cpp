@@ -40,6 +40,11 @@ Vec3d BakedPatches::centre(uint32_t patch) const {
   return (sum + corner(patch, 3)) / 4;
 }
 
+Vec3d BakedPatches::direction(uint32_t patch) const {
+  const float* const x = directions.data() + size_t{3} * patch;
+  return {x[0], x[1], x[2]};
+}
+
 MeshTexel mixTexels(const BakedPatches& patches, uint32_t patch, float column, float row) {
   constexpr uint32_t kNumbers = BakedPatches::kNumbers;
   const uint32_t edge = patches.patchEdge;

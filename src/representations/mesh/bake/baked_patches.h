@@ -19,6 +19,7 @@ struct BakedPatches {
   uint32_t patchEdge = 8;  // T
   uint32_t pairs = 0;
   std::vector<double> vertices;                    // [patches][4][3], units of the part
+  std::vector<float> directions;                   // [patches][3], in which rays see them on average, of length 1
   std::vector<uint8_t> texels;                     // [patches][T][T][kNumbers], rows first; opacity / 255 last. May be
                                                    // empty
   std::vector<uint8_t> baseColours;                // [patches][T][T][3], without dependence on the view; may be empty
@@ -29,6 +30,7 @@ struct BakedPatches {
   uint32_t triangles() const { return patches() + pairs; }
   Vec3d corner(uint32_t patch, uint32_t number) const;
   Vec3d centre(uint32_t patch) const;  // of the corners that have a meaning
+  Vec3d direction(uint32_t patch) const;
 };
 
 // Mixes the texels of a patch at a column and a row in [0, T-1].

@@ -12,6 +12,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/image_io.h"
+#include "representations/mesh/bake/patch_order.h"
 #include "representations/mesh/content/fallback_mesh.h"
 #include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/content/mesh_payload.h"
@@ -271,8 +272,9 @@ class MeshBaker final : public Baker {
                   const BlockEncoder* encoder, GrowingContent& to) const {
     const Bc4Effort effort = options_.effort >= kExhaustiveFromEffort ? Bc4Effort::exhaustive : Bc4Effort::fast;
     const size_t most = maxPatches(baked.patchEdge);
-    for (size_t first = 0; first < patches.size(); first += most) {
-      const auto some = std::span(patches).subspan(first, std::min(most, patches.size() - first));
+    const std::vector<uint32_t> ordered = orderPatches(baked, patches);
+    for (size_t first = 0; first < ordered.size(); first += most) {
+      const auto some = std::span(ordered).subspan(first, std::min(most, ordered.size() - first));
       const SceneFromPart placement = sceneFromPart(model);
       PatchSet& part = to.content.parts.emplace_back(encoder ? arrangePatches(baked, some, placement)
                                                              : compressPatches(baked, some, placement, effort));

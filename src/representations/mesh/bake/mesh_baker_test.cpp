@@ -48,8 +48,8 @@ class BakeMeshScene : public testing::Test {
   }
 
   static fs::path model() { return *cube_ / "model"; }
-  static BakedScene bake(const std::string& name, const MeshSceneSettings& settings) {
-    const auto baker = makeMeshBaker(loadTrainedMesh(*device_, model()), settings);
+  static BakedScene bake(const std::string& name, const MeshSceneSettings& settings, Device& device = *device_) {
+    const auto baker = makeMeshBaker(loadTrainedMesh(device, model()), settings);
     return bakeScene(*baker, cube_->capture(), *cube_ / name, {});
   }
   static std::unique_ptr<SceneRenderer> open(const std::string& name, int finestLevel = 0) {
@@ -96,12 +96,31 @@ TEST_F(BakeMeshScene, LooksAsTheModelAtItsFinestLevel) {
 
 TEST_F(BakeMeshScene, GivesTheSameBytesAgainAndTheSameImageFromOtherTiles) {
   bake("one", {.tilesPerBlock = 1});
-  bake("again", {.tilesPerBlock = 1});
+  const std::unique_ptr<Device> oneThread = makeDevice({"cpu", 1});
+  bake("again", {.tilesPerBlock = 1}, *oneThread);
   bake("pieces", {.tilesPerBlock = 4});
   EXPECT_EQ(readTextFile(*cube_ / "one" / "tileset.json"), readTextFile(*cube_ / "again" / "tileset.json"))
       << "names contain digests of the files";
   const auto one = open("one"), pieces = open("pieces");
   EXPECT_GT(compare(*one, *pieces), 50) << "the same patches in other tiles";
+}
+
+TEST_F(BakeMeshScene, HasPatchesInTheOrderOfTheirSurfaces) {
+  const BakedScene baked = bake("in_order", {.tilesPerBlock = 1, .fallback = false});
+  size_t pairs = 0, neighbours = 0;
+  for (const Tile& tile : baked.tileset.tiles)
+    for (const TileContent& listed : tile.contents) {
+      const auto content = readContent(contentPath(*cube_ / "in_order", listed.uri), meshCodec());
+      for (const PatchSet& part : contentAs<MeshContent>(*content).parts)
+        for (uint32_t patch = 1; patch < part.pairs; ++patch, ++pairs) {
+          bool hasCommonCorner = false;
+          for (uint32_t number = 0; number < 16; ++number)
+            hasCommonCorner = hasCommonCorner || part.corner(patch, number / 4) == part.corner(patch - 1, number % 4);
+          neighbours += hasCommonCorner ? 1 : 0;
+        }
+    }
+  EXPECT_GT(pairs, 500u);
+  EXPECT_GT(neighbours, pairs / 2) << "patches that follow one another have a corner in common";
 }
 
 TEST_F(BakeMeshScene, ContainsOrdinaryMeshesWithTexturesThatExist) {
