@@ -13,8 +13,10 @@
 #   holes        200 fresh views of that city from other heights: the share of pixels in which the scene's blocks have a hole, at the
 #                finest level and with levels mixed
 #   losses       one block with both losses and with the first alone, without the final stage, three seeds: PSNR of the scenes
-#   quads        one block of octahedra and of MobileNeRF's quads, in the same time, three seeds; also with equal numbers of
-#                triangles, without the final stage
+#   alpha        the city's scene with the opacities of texels as trained, and with 1 from 0.5 on and else 0: held-out PSNR of all
+#                pixels, and of those of trees and of water
+#   quads        one block of octahedra and of MobileNeRF's quads, in the same time, three seeds, also by the pixels of roofs and of
+#                wires alone; and with equal numbers of triangles, without the final stage
 #   depth        one block with and without the loss of depths at sparse points, three seeds: errors of depth, PSNR
 #   traffic      one block of a city with cars that move, in the same time: with their masks, with `transient=auto` and without
 #                masks, in the held-out photos of the same city without cars; how well the masks that training makes match the true ones
@@ -31,6 +33,7 @@
 #   yardstick    that scene against the city's true triangles with as many texels, coloured by the training photos: an ideal
 #                photogrammetric mesh
 #   fox, beach   real photographs, 10 minutes each: held-out PSNR of the baked scene
+# What a pixel shows is known from the generator of the city (mesh_classes.cpp).
 # Resumable: everything is kept in build/bench/mesh, and what exists is not made again; remove traversal-* there to repeat a row.
 #   [ROWS="traversal city levels …"] [SEEDS="1 2 3"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
 # CAPTURE: the capture of MODEL, if it is not where its blocks.json says.
@@ -217,6 +220,31 @@ losses() {
   verdict "one block, gain of the second loss in dB" "$gain" '>=' 0.5
 }
 
+# classified NAME CAPTURE FILE [--binarised]: the error of the scene NAME.scene by what pixels show, in NAME.FILE.json.
+classified() {
+  local program=build/release/bench/mesh_classes file=$work/$1.$3.json
+  [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_classes"
+  [ -s "$file" ] || {
+    "$program" ${4:+"$4"} "$work/$1.scene" "$work/$2" > "$file.part"
+    mv "$file.part" "$file"
+  }
+}
+
+alpha() {
+  need_tessera
+  local of
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  classified city-mesh city classes
+  classified city-mesh city binarised --binarised
+  for of in all trees water; do
+    jq -r --arg of "$of" --slurpfile binarised "$work/city-mesh.binarised.json" '.[0][$of] as $as |
+      $binarised[0][0][$of] as $bits | "city 2x2, \($of), \($as.pixels) pixels: opacities as trained \($as.psnr) dB, " +
+      "binarised at 0.5 \($bits.psnr) dB"' "$work/city-mesh.classes.json"
+  done
+}
+
 quads() {
   block
   local octahedra quads
@@ -226,9 +254,14 @@ quads() {
   gained "octahedra less quads, SSIM" final quads .ssim
   gained "octahedra less quads in dB" final quads .psnr
   verdict "one block, octahedra less quads in dB, lower end of the interval" "$lowest" '>=' 0
+  local seed faces name class
+  for seed in ${SEEDS:-1 2 3}; do
+    classified "final-$seed" block classes
+    classified "quads-$seed" block classes
+  done
+  for class in roofs wires; do gained "octahedra less quads in pixels of $class, in dB" final quads "[0].$class.psnr" .classes; done
   seeded plain --set final_share=0 > /dev/null
   seeded quads-plain --set final_share=0 --set quads=true > /dev/null
-  local seed faces name
   for seed in ${SEEDS:-1 2 3}; do
     faces=$(jq '.levels[0].triangles' "$work/plain-$seed.bake.json" "$work/quads-plain-$seed.bake.json" | sort -n | head -1)
     for name in plain quads-plain; do
@@ -524,7 +557,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city levels final holes losses quads depth traffic borders processes killed vulkan fallback yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses alpha quads depth traffic borders processes killed vulkan fallback yardstick fox beach}; do
   "$row"
 done
 finish

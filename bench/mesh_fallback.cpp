@@ -6,8 +6,8 @@
 // where they are transparent, the scene's sky is put behind them. They are compared with
 //   oracle   the scene as the CPU renders it
 //   plain    the same without view dependence: all hits composited, each with the base colour of its texels
-//   cut      the ordinary mesh by Embree, as glTF defines it: the nearest hit with an opacity of at least kFallbackAlphaCutoff
-//   photo    the held-out photo
+//   cut      the ordinary mesh by Embree, as glTF defines it: the nearest hit with an opacity of at least
+//   kFallbackAlphaCutoff photo    the held-out photo
 // and these with each other. Writes VIEW-oracle.png, VIEW-plain.png and VIEW-cut.png. See mesh.sh.
 #include <algorithm>
 #include <array>
@@ -19,11 +19,10 @@
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "bench/mesh_scene.h"
 #include "eval/psnr.h"
 #include "eval/ssim.h"
 #include "import/capture_reader.h"
-#include "render/cpu/scene_renderer.h"
-#include "render/tile_scene.h"
 #include "representations/mesh/content/fallback_mesh.h"
 #include "representations/mesh/content/mesh_payload.h"
 #include "representations/mesh/cpu/mesh_drawer.h"
@@ -281,11 +280,8 @@ Json compare(const fs::path& folder, const fs::path& captureFolder, const fs::pa
   const Tileset tileset = readTileset(folder);
   const Capture capture = readCapture(captureFolder);
   BaseColourRenderer renderer(folder, tileset);
-  TileScene scene = openTileScene(folder, meshCodec());
-  SceneRendererSettings settings;
-  settings.selection.maximumScreenSpaceError = 0;
-  settings.budgetBytes = uint64_t{8} << 30;
-  SceneRenderer oracle(makeMeshDrawer(), scene.frame, std::move(scene.tree), std::move(scene.source), settings);
+  const OpenedMeshScene scene = openMeshScene(folder, makeMeshDrawer());
+  SceneRenderer& oracle = *scene.renderer;
   Json sums = Json::object();
   uint64_t views = 0;
   for (const Photo& photo : heldOutPhotos(capture, tileset)) {

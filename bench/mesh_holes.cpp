@@ -12,32 +12,22 @@
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "bench/mesh_scene.h"
 #include "import/capture_reader.h"
-#include "render/cpu/scene_renderer.h"
-#include "render/tile_scene.h"
-#include "representations/mesh/content/mesh_payload.h"
-#include "representations/mesh/cpu/mesh_drawer.h"
 #include "tiles/scene_folder.h"
 
 namespace tessera {
 namespace {
 
 // Draws the blocks alone: the background would hide holes.
-class BlocksDrawer final : public CpuDrawer {
+class BlocksDrawer final : public ChangedMeshDrawer {
  public:
-  uint64_t residentBytes(uint64_t decodedBytes) const override { return drawer_->residentBytes(decodedBytes); }
-  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content, int threads) const override {
-    return drawer_->prepare(std::move(content), threads);
-  }
   RenderedView draw(const SceneView<Content>& view, const ViewRequest& request, const DrawSettings& settings,
                     ThreadPool& pool, DrawCounts& counts) override {
     SceneView<Content> blocks = view;
     blocks.backgroundBlock = nullptr;
-    return drawer_->draw(blocks, request, settings, pool, counts);
+    return ChangedMeshDrawer::draw(blocks, request, settings, pool, counts);
   }
-
- private:
-  std::unique_ptr<CpuDrawer> drawer_ = makeMeshDrawer();
 };
 
 nlohmann::ordered_json countHoles(const fs::path& folder, const fs::path& captureFolder, double screenSpaceError) {
@@ -45,13 +35,9 @@ nlohmann::ordered_json countHoles(const fs::path& folder, const fs::path& captur
   const Tileset tileset = readTileset(folder);
   // The city is the same, but the capture's world need not be.
   const Mat4d worldFromCapture = tileset.sourceFromWorld.inverse() * capture.sourceFromWorld;
-  TileScene scene = openTileScene(folder, meshCodec());
-  const TileFrame frame = scene.frame;
-  const TileTree tree = scene.tree;
-  SceneRendererSettings settings;
-  settings.selection.maximumScreenSpaceError = screenSpaceError;
-  SceneRenderer renderer(std::make_unique<BlocksDrawer>(), frame, std::move(scene.tree), std::move(scene.source),
-                         settings);
+  const OpenedMeshScene scene = openMeshScene(folder, std::make_unique<BlocksDrawer>(), screenSpaceError);
+  const TileFrame& frame = scene.frame;
+  SceneRenderer& renderer = *scene.renderer;
   uint64_t surfaces = 0, holes = 0, views = 0;
   std::set<int> levels;
   std::vector<double> shares;
@@ -64,7 +50,7 @@ nlohmann::ordered_json countHoles(const fs::path& folder, const fs::path& captur
     const ImageF depth = readDepth(photo.depth, photo.depthUnit);
     const RenderedView view = renderer.render(camera, pose, nullptr);
     for (const SelectedTile& tile : renderer.cut().tiles)
-      if (tile.visible) levels.insert(tree.tiles[static_cast<size_t>(tile.content)].level);
+      if (tile.visible) levels.insert(scene.tree.tiles[static_cast<size_t>(tile.content)].level);
     uint64_t ofView = 0, holesOfView = 0;
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {

@@ -20,14 +20,13 @@
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "bench/mesh_scene.h"
+#include "bench/synthetic_city.h"
 #include "eval/evaluate.h"
 #include "eval/psnr.h"
 #include "import/capture_reader.h"
-#include "render/cpu/scene_renderer.h"
-#include "render/tile_scene.h"
 #include "representations/mesh/content/mesh_payload.h"
 #include "representations/mesh/cpu/mesh_drawer.h"
-#include "synth/city_scene.h"
 #include "synth/photographer.h"
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
@@ -50,13 +49,6 @@ uint64_t countTexels(const fs::path& folder) {
         texels += uint64_t{part.patches} * part.patchEdge * part.patchEdge;
     }
   return texels;
-}
-
-std::unique_ptr<CityScene> rebuildCity(const fs::path& capture, ThreadPool& pool) {
-  const auto options = nlohmann::json::parse(readTextFile(capture / "synth.json"));
-  int columns = 0, rows = 0;
-  std::sscanf(options.at("blocks").get<std::string>().c_str(), "%dx%d", &columns, &rows);
-  return std::make_unique<CityScene>(columns, rows, options.at("seed").get<uint64_t>(), pool);
 }
 
 // The texture of a triangle, or of a square of foliage: a lattice over a parallelogram.
@@ -191,11 +183,8 @@ class TexturedCity final : public ViewRenderer {
     for (const TrainingPhoto& photo : photos_)
       for (int y = 0; y < photo.camera.height; ++y)
         for (int x = 0; x < photo.camera.width; ++x) {
-          const auto inCamera = photo.camera.directionInCamera({x + 0.5, y + 0.5});
-          if (!inCamera) continue;
-          const auto hit =
-              city_->tracer->intersect({photo.pose.translation.cast<float>(),
-                                        (photo.pose.rotation * *inCamera).cast<float>().normalized(), 0.05f});
+          const auto ray = rayThrough(photo.camera, photo.pose, {x + 0.5, y + 0.5});
+          const auto hit = ray ? city_->tracer->intersect(*ray) : std::nullopt;
           if (!hit) continue;
           sums[faceNumber(*hit)] += photo.camera.focalX() / hit->distance;
           ++counts[faceNumber(*hit)];
@@ -338,11 +327,10 @@ class TexturedCity final : public ViewRenderer {
   }
 
   Vec3f colourAlong(const Camera& camera, const Pose& pose, double x, double y) const {
-    const auto inCamera = camera.directionInCamera({x, y});
-    if (!inCamera) return Vec3f::Zero();
-    const Ray ray{pose.translation.cast<float>(), (pose.rotation * *inCamera).cast<float>().normalized(), 0.05f};
-    const auto hit = city_->tracer->intersect(ray);
-    return hit ? colourAt(*hit) : sky(ray.direction);
+    const auto ray = rayThrough(camera, pose, {x, y});
+    if (!ray) return Vec3f::Zero();
+    const auto hit = city_->tracer->intersect(*ray);
+    return hit ? colourAt(*hit) : sky(ray->direction);
   }
   Vec3f colourAt(const SurfaceHit& hit) const {
     const FaceTexture& face = faces_[faceNumber(hit)];
@@ -408,13 +396,10 @@ nlohmann::ordered_json judge(ViewRenderer& renderer, const Capture& capture, con
 
 nlohmann::ordered_json measure(const fs::path& folder, const fs::path& captureFolder, const fs::path& images) {
   const Capture capture = readCapture(captureFolder);
-  TileScene scene = openTileScene(folder, meshCodec());
-  const TileFrame frame = scene.frame;
-  SceneRendererSettings settings;
-  settings.selection.maximumScreenSpaceError = 0;
-  SceneRenderer renderer(makeMeshDrawer(), frame, std::move(scene.tree), std::move(scene.source), settings);
+  const OpenedMeshScene scene = openMeshScene(folder, makeMeshDrawer());
+  const TileFrame& frame = scene.frame;
   nlohmann::ordered_json result;
-  result["scene"] = judge(renderer, capture, frame, {});
+  result["scene"] = judge(*scene.renderer, capture, frame, {});
   const uint64_t texels = countTexels(folder);
   result["texels_of_scene"] = texels;
   TexturedCity city(captureFolder, capture);

@@ -18,6 +18,9 @@ class ModelRenderSource final : public RenderSource {
   std::vector<std::string> trainedOnAmong(const Capture& capture, Split split) const override {
     return tessera::trainedOnAmong(folder_, capture, split);
   }
+  std::vector<SurfaceCoverage> coverage() const override {
+    return readCoverage(findModelMethod(folder_), folder_.root());
+  }
 
  private:
   ModelFolder folder_;

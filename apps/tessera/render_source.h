@@ -6,6 +6,7 @@
 #include "base/file.h"
 #include "compute/device.h"
 #include "scene/capture.h"
+#include "scene/surface_coverage.h"
 #include "scene/view_renderer.h"
 
 namespace tessera {
@@ -19,6 +20,8 @@ class RenderSource {
   virtual void requireMatchingWorld(const Capture& capture) const = 0;
   // Returns the names of those photos of the capture's split that this was trained on.
   virtual std::vector<std::string> trainedOnAmong(const Capture& capture, Split split) const = 0;
+  // Returns how well its surfaces cover what the training photos show; nothing if training has not checked it.
+  virtual std::vector<SurfaceCoverage> coverage() const = 0;
 };
 
 struct RenderSourceOptions {

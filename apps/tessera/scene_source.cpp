@@ -99,6 +99,7 @@ class SceneRenderSource final : public RenderSource {
   std::vector<std::string> trainedOnAmong(const Capture&, Split) const override {
     return {};
   }  // scenes do not record their training photos
+  std::vector<SurfaceCoverage> coverage() const override { return tileset_.coverage; }
 
  private:
   fs::path folder_;

@@ -65,7 +65,8 @@ void addEvalVerb(CLI::App& app) {
       builder.add(result, pictures);
       progress.update(++done, fmt::format("{:.2f} dB", result.psnr));
     };
-    const EvaluationReport report = evaluate(renderSource->renderer(), capture, options);
+    EvaluationReport report = evaluate(renderSource->renderer(), capture, options);
+    report.coverage = renderSource->coverage();
     progress.finish();
     const fs::path page = flags->report.empty() ? fs::path(flags->model) / "report.html" : fs::path(flags->report);
     builder.write(page, report);

@@ -41,6 +41,11 @@ ordered_json describeCapture(const fs::path& folder) {
   return info;
 }
 
+void addCoverage(ordered_json& info, const std::vector<SurfaceCoverage>& coverage) {
+  for (const SurfaceCoverage& part : coverage)
+    info["coverage"][part.part] = {{"pixels", part.pixels}, {"holes", part.holes}, {"share", part.share()}};
+}
+
 ordered_json describeModel(const fs::path& folder) {
   const ModelFolder model(folder);
   const std::optional<ModelManifest> manifest = model.manifest();
@@ -59,6 +64,7 @@ ordered_json describeModel(const fs::path& folder) {
                       {"edge", placement.grid ? placement.grid->edge : 0}};
   }
   for (const auto& [key, number] : method.describe(*settings)) info[key] = number;
+  if (manifest) addCoverage(info, readCoverage(method, folder));
   for (const ConfigField& field : settings->fields()) info["config"][std::string(field.name)] = configValueText(field);
   return info;
 }
@@ -109,6 +115,7 @@ ordered_json describeScene(const fs::path& folder) {
     info["shared_resources"] = {
         {"files", resources.size()}, {"bytes_on_disk", shared.onDisk}, {"bytes_in_memory", shared.inMemory}};
   }
+  addCoverage(info, tileset.coverage);
   return info;
 }
 

@@ -36,6 +36,7 @@ SceneWriter::SceneWriter(const fs::path& folder, const Capture& capture, const S
   tileset_.georeference = capture.geo;
   tileset_.near = about.near;
   tileset_.background = about.background;
+  tileset_.coverage = about.coverage;
   placeOn(tileset_, about.grid);
 }
 

@@ -141,5 +141,15 @@ TEST_F(SceneWriting, UsesTheRequestedBackgroundOrElseTheBakers) {
   EXPECT_EQ(readTileset(folder_ / "scene").background, *options.background);
 }
 
+TEST_F(SceneWriting, RecordsTheCoverageThatTheBakerStates) {
+  OneContent unchecked(about_);
+  bakeScene(unchecked, capture_, folder_ / "scene", {});
+  EXPECT_TRUE(readTileset(folder_ / "scene").coverage.empty());
+  about_.coverage = {{"block_0_0", 100, 3}, {"block_1_0", 50, 0}};
+  OneContent checked(about_);
+  bakeScene(checked, capture_, folder_ / "scene", {});
+  EXPECT_EQ(readTileset(folder_ / "scene").coverage, about_.coverage);
+}
+
 }  // namespace
 }  // namespace tessera

@@ -11,6 +11,7 @@
 #include "base/image.h"
 #include "eval/depth_error.h"
 #include "scene/capture.h"
+#include "scene/surface_coverage.h"
 #include "scene/view_renderer.h"
 
 namespace tessera {
@@ -58,6 +59,8 @@ struct EvaluationReport {
   std::string device;
   Split split = Split::test;
   bool fitExposure = false;
+  // Of the surfaces of what was evaluated: for callers that know it to set. Empty if it was not checked.
+  std::vector<SurfaceCoverage> coverage;
 };
 
 // Evaluates all photos of the split. The premultiplied colour of the render is composited over renderer.background(),
@@ -70,7 +73,7 @@ struct EvaluationReport {
 EvaluationReport evaluate(ViewRenderer& renderer, const Capture& capture, const EvaluateOptions& options);
 
 // Returns one JSON object: psnr, ssim, lpips (null without weights), lpips_net, depth (null without depth maps),
-// views[], seconds_per_frame, device, exposure, split, units. Undefined numbers are null.
+// views[], seconds_per_frame, device, exposure, split, coverage[] if there is any, units. Undefined numbers are null.
 std::string toJson(const EvaluationReport& report);
 
 std::string_view splitName(Split split);

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "eval/evaluate.h"
+#include "scene/surface_coverage_json.h"
 
 namespace tessera {
 namespace {
@@ -55,23 +56,23 @@ std::string toJson(const EvaluationReport& report) {
     if (report.fitExposure) one["gain"] = view.gain;
     views.push_back(std::move(one));
   }
-  const ordered_json object = {
-      {"psnr", number(report.psnr)},
-      {"ssim", number(report.ssim)},
-      {"lpips", number(report.lpips)},
-      {"lpips_net", report.lpipsNet.empty() ? ordered_json(nullptr) : ordered_json(report.lpipsNet)},
-      {"depth", depthObject(report.depth)},
-      {"views", std::move(views)},
-      {"seconds_per_frame", number(report.secondsPerFrame)},
-      {"device", report.device},
-      {"exposure", exposureName(report.fitExposure)},
-      {"split", splitName(report.split)},
-      {"units",
-       {{"psnr", "dB, mean over views, unrounded rendering against photo bytes / 255, at most 99"},
-        {"ssim", "11x11 Gaussian, valid windows, mean over views"},
-        {"lpips", "version 0.1, inputs in [-1, 1], mean over views"},
-        {"depth", "z-depth in world units; absolute_relative and within_1.25 are ratios"},
-        {"seconds", "rendering alone"}}}};
+  ordered_json object = {{"psnr", number(report.psnr)},
+                         {"ssim", number(report.ssim)},
+                         {"lpips", number(report.lpips)},
+                         {"lpips_net", report.lpipsNet.empty() ? ordered_json(nullptr) : ordered_json(report.lpipsNet)},
+                         {"depth", depthObject(report.depth)},
+                         {"views", std::move(views)},
+                         {"seconds_per_frame", number(report.secondsPerFrame)},
+                         {"device", report.device},
+                         {"exposure", exposureName(report.fitExposure)},
+                         {"split", splitName(report.split)},
+                         {"units",
+                          {{"psnr", "dB, mean over views, unrounded rendering against photo bytes / 255, at most 99"},
+                           {"ssim", "11x11 Gaussian, valid windows, mean over views"},
+                           {"lpips", "version 0.1, inputs in [-1, 1], mean over views"},
+                           {"depth", "z-depth in world units; absolute_relative and within_1.25 are ratios"},
+                           {"seconds", "rendering alone"}}}};
+  if (!report.coverage.empty()) object["coverage"] = coverageToJson(report.coverage);
   return object.dump(2, ' ', false, ordered_json::error_handler_t::replace);
 }
 

@@ -77,6 +77,9 @@ std::string summary(const EvaluationReport& report) {
     html += card(fmt::format("{:.2f} %", 100 * report.depth->absoluteRelative), "mean relative depth error");
     html += card(fmt::format("{:.1f} %", 100 * report.depth->within125), "of depths within a factor of 1.25");
   }
+  if (!report.coverage.empty()) {
+    html += card(fmt::format("{:.3f} %", 100 * sumCoverage(report.coverage).share()), "of surface pixels with a hole");
+  }
   html += card(formattedSeconds(report.secondsPerFrame), "per frame");
   html += "</div>\n";
   html += fmt::format(
@@ -139,6 +142,19 @@ std::string table(const EvaluationReport& report, const std::vector<size_t>& ord
   return html + "</table></div>\n";
 }
 
+std::string coverageTable(const std::vector<SurfaceCoverage>& parts) {
+  if (parts.empty()) return {};
+  std::string html =
+      "<h2>Coverage</h2>\n<p class=\"quiet\">Pixels of the training photos that show a surface of a part, checked in "
+      "training; in a hole, the part is less than half opaque.</p>\n<div class=\"scroll table\"><table>\n"
+      "<tr><th>part</th><th>pixels</th><th>holes</th><th>share</th></tr>\n";
+  for (const SurfaceCoverage& part : parts) {
+    html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{:.3f} %</td></tr>\n", escapedHtml(part.part),
+                        part.pixels, part.holes, 100 * part.share());
+  }
+  return html + "</table></div>\n";
+}
+
 }  // namespace
 
 ReportBuilder::ReportBuilder(std::string title, size_t expectedViews)
@@ -191,6 +207,7 @@ std::string ReportBuilder::html(const EvaluationReport& report) const {
   html += summary(report);
   html += bars(report);
   html += table(report, order);
+  html += coverageTable(report.coverage);
   html +=
       "<h2>Images</h2>\n<p class=\"quiet\" style=\"margin-bottom:.8rem\">Click an image to enlarge it and again to "
       "return.</p>\n";

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <nlohmann/json.hpp>
 
 #include "eval/html.h"
 #include "eval/testing/fake_capture.h"
@@ -54,6 +55,20 @@ TEST(Report, ContainsEveryViewWithItsFourImages) {
   EXPECT_EQ(countOccurrences(judged.html, "<img "), 12u);
   EXPECT_EQ(countOccurrences(judged.html, "src=\"data:image/jpeg;base64,/9j/"), 12u);
   EXPECT_NE(judged.html.find(fmt::format("{:.2f} dB", judged.report.psnr)), std::string::npos);
+}
+
+TEST(Report, CountsHolesOfPartsWhereTheyWereChecked) {
+  Judged judged = judge({"one.png"});
+  EXPECT_EQ(judged.html.find("Coverage"), std::string::npos);
+  EXPECT_EQ(toJson(judged.report).find("coverage"), std::string::npos);
+  judged.report.coverage = {{"block_<0>_0", 1000, 3}, {"block_1_0", 1000, 0}};
+  const std::string html = ReportBuilder("title", 1).html(judged.report);
+  EXPECT_NE(html.find("<tr><td>block_&lt;0&gt;_0</td><td>1000</td><td>3</td><td>0.300 %</td></tr>"), std::string::npos);
+  EXPECT_NE(html.find("<tr><td>block_1_0</td><td>1000</td><td>0</td><td>0.000 %</td></tr>"), std::string::npos);
+  EXPECT_NE(html.find("<b>0.150 %</b>"), std::string::npos) << "of all parts together";
+  const auto json = nlohmann::json::parse(toJson(judged.report));
+  EXPECT_EQ(json["coverage"][0], (nlohmann::json{{"part", "block_<0>_0"}, {"pixels", 1000}, {"holes", 3}}));
+  EXPECT_EQ(json["coverage"].size(), 2u);
 }
 
 TEST(Report, PutsTheWorstViewFirst) {

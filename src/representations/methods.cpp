@@ -45,6 +45,10 @@ std::unique_ptr<MethodSettings> savedSettings(const Method& method, const fs::pa
   return settings;
 }
 
+std::vector<SurfaceCoverage> readCoverage(const Method& method, const fs::path& model) {
+  return method.readCoverage != nullptr ? method.readCoverage(model) : std::vector<SurfaceCoverage>();
+}
+
 const Method& firstMethod(bool (*has)(const Method&)) {
   const auto all = methods();
   const auto it = std::find_if(all.begin(), all.end(), [&](const Method* method) { return has(*method); });

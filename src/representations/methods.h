@@ -18,6 +18,9 @@ const Method& findModelMethod(const ModelFolder& model, const ModelManifest& man
 // Returns the settings that the training run in the folder `model` saved; the method's defaults if there are none.
 std::unique_ptr<MethodSettings> savedSettings(const Method& method, const fs::path& model);
 
+// Returns Method::readCoverage of a trained model; nothing for methods that do not check it.
+std::vector<SurfaceCoverage> readCoverage(const Method& method, const fs::path& model);
+
 // Returns the first method that satisfies the predicate `has`; CHECKs that there is one.
 const Method& firstMethod(bool (*has)(const Method&));
 // Returns the names of the methods that satisfy the predicate `have`, in the order of list.h, as text: "volume and

@@ -169,6 +169,7 @@ TEST(Methods, TrainDescribeDrawAndBakeTheirModels) {
     const Camera camera = scene.capture().cameras[0].scaledTo(8, 6);
     EXPECT_EQ(opened->renderer().render(camera, scene.capture().photos[0].worldFromCamera).colour.pixels.size(), 144u);
     EXPECT_EQ(opened->rayWork().samples > 0, method->countsSamples) << method->name;
+    EXPECT_EQ(readCoverage(*method, model).empty(), method->readCoverage == nullptr) << method->name;
 
     if (!isBaked(*method)) continue;
     BakeParameters parameters;

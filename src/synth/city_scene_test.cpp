@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
 #include <numbers>
 
 #include "base/threads.h"
@@ -29,11 +30,11 @@ TEST(CityScene, HangsWiresBetweenWiredPoles) {
       const Vec3f wire = mix(from, to, 0.45f) + across * side + Vec3f(0, 0, 0.2f - 0.882f);
       const auto hit = tracer.intersect({wire + Vec3f(0, 0, 0.3f), {0, 0, -1}, 0, 0.6f});
       if (!city.poles[i].wires) {
-        EXPECT_FALSE(hit && hit->material == Material::rubber) << "after the last pole of a line";
+        EXPECT_FALSE(hit && hit->material == Material::wire) << "after the last pole of a line";
         continue;
       }
       ASSERT_TRUE(hit) << "pole " << i;
-      EXPECT_EQ(hit->material, Material::rubber) << "pole " << i;
+      EXPECT_EQ(hit->material, Material::wire) << "pole " << i;
       EXPECT_NEAR(hit->position.z(), wire.z(), 0.05f) << "pole " << i;
       // The wire is thin: 10 cm beside it there is air.
       EXPECT_FALSE(tracer.occluded({wire + across * 0.1f + Vec3f(0, 0, 0.3f), {0, 0, -1}, 0, 0.6f})) << "pole " << i;
@@ -41,6 +42,47 @@ TEST(CityScene, HangsWiresBetweenWiredPoles) {
     spans += city.poles[i].wires ? 1 : 0;
   }
   EXPECT_GT(spans, 8);
+}
+
+TEST(CityScene, TellsWhatThingASurfaceBelongsTo) {
+  const CityLayout city = planCity(2, 2, 3);
+  const SurfaceMesh mesh = buildCity(city);
+  const TraceDevice device;
+  const TraceScene tracer(device, mesh);
+  // The share of rays that end on a surface of the class.
+  std::map<SurfaceClass, std::pair<int, int>> shares;
+  const auto look = [&](SurfaceClass expected, const Vec3f& from, const Vec3f& direction, float far) {
+    auto& [hits, rays] = shares[expected];
+    const auto hit = tracer.intersect({from, direction, 0, far});
+    hits += hit && classOfMaterial(hit->material) == expected ? 1 : 0;
+    ++rays;
+  };
+  const auto lookDown = [&](SurfaceClass expected, const Vec2f& at, float height) {
+    look(expected, {at.x(), at.y(), city.ground(at.x(), at.y()) + height}, {0, 0, -1}, height + 5);
+  };
+  for (const Building& building : city.buildings) {
+    if (city.area.inside(building.centre.x(), building.centre.y()) < 0) continue;
+    lookDown(SurfaceClass::roof, building.place(0.3f * building.halfX, 0.3f * building.halfY), 200);
+    const std::vector<Vec2f> outline = building.outline();
+    const Vec2f along = outline[1] - outline[0], middle = outline[0] + 0.4f * along;
+    const Vec3f outward = Vec3f(along.y(), -along.x(), 0).normalized();
+    look(SurfaceClass::facade, Vec3f(middle.x(), middle.y(), building.base + 0.5f * building.height()) + outward,
+         -outward, 2);
+  }
+  for (const Tree& tree : city.trees) lookDown(SurfaceClass::tree, tree.foot, tree.height + 1);
+  for (const Block& block : city.blocks)
+    for (const Pond& pond : block.ponds) lookDown(SurfaceClass::water, pond.centre, 3);
+  for (const Pole& lamp : city.lamps) lookDown(SurfaceClass::wire, lamp.foot, lamp.height + 1);
+  for (const Pole& pole : city.poles) lookDown(SurfaceClass::wire, pole.foot, pole.height + 1);
+  for (const ParkedCar& car : city.parkedCars) lookDown(SurfaceClass::car, car.centre, 3);
+  for (const Street& street : city.alongY)
+    for (int i = -10; i <= 10; ++i)
+      lookDown(SurfaceClass::ground, {street.centre, 0.04f * static_cast<float>(i) * city.area.depth()}, 2);
+  EXPECT_EQ(shares.size(), size_t{kSurfaceClasses});
+  for (const auto& [expected, share] : shares) {
+    EXPECT_GT(share.second, 0);
+    EXPECT_GT(share.first, 0.8 * share.second) << "class " << static_cast<int>(expected);
+  }
 }
 
 // Returns horizontal rays through the inside of the crown, from all around.

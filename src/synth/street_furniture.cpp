@@ -11,7 +11,7 @@ void addWire(const Vec3f& from, const Vec3f& to, float sag, uint32_t object, Sur
     const float t = static_cast<float>(i) / kPieces;
     return Vec3f(mix(from, to, t) - Vec3f(0, 0, 4 * sag * t * (1 - t)));
   };
-  for (int i = 0; i < kPieces; ++i) mesh.addTube(point(i), point(i + 1), kRadius, kRadius, 3, Material::rubber, object);
+  for (int i = 0; i < kPieces; ++i) mesh.addTube(point(i), point(i + 1), kRadius, kRadius, 3, Material::wire, object);
 }
 
 }  // namespace
@@ -39,8 +39,8 @@ void addStreetFurniture(const CityLayout& city, SurfaceMesh& mesh) {
   }
   for (const Pole& lamp : city.lamps) {
     const Vec3f foot = stand(lamp.foot), top = foot + Vec3f(0, 0, lamp.height);
-    mesh.addTube(foot, top, 0.09f, 0.06f, 5, Material::metal, steel);
-    mesh.addBox(top - Vec3f(0, 0, 0.05f), {0.9f, 0.9f, 0.14f}, 0, Material::metal, steel);
+    mesh.addTube(foot, top, 0.09f, 0.06f, 5, Material::lamp, steel);
+    mesh.addBox(top - Vec3f(0, 0, 0.05f), {0.9f, 0.9f, 0.14f}, 0, Material::lamp, steel);
   }
 }
 

@@ -84,6 +84,7 @@ Surface surfaceAt(const CityLayout& city, const SurfaceHit& hit, float width) {
       s.albedo = object.colour * (1 + 0.12f * fractalNoise(u, v, object.seed, 2.5f, 4, width));
       break;
     case Material::metal:
+    case Material::lamp:
       s.albedo = object.colour * (1 - 0.15f * stripes(u, 0.9f, 0.05f, width));
       break;
     case Material::vents: {
@@ -135,6 +136,7 @@ Surface surfaceAt(const CityLayout& city, const SurfaceHit& hit, float width) {
       s.albedo = object.colour;
       s.gloss = 1;
       break;
+    case Material::wire:
     case Material::rubber:
       s.albedo = object.colour;
       break;

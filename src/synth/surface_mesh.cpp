@@ -4,6 +4,41 @@
 
 namespace tessera {
 
+SurfaceClass classOfMaterial(Material material) {
+  switch (material) {
+    case Material::terrain:
+    case Material::blockTop:
+    case Material::kerb:
+      return SurfaceClass::ground;
+    case Material::facade:
+    case Material::plain:
+    case Material::awning:
+      return SurfaceClass::facade;
+    case Material::parapet:
+    case Material::flatRoof:
+    case Material::tileRoof:
+    case Material::metal:
+    case Material::vents:
+    case Material::solarPanel:
+    case Material::skylight:
+      return SurfaceClass::roof;
+    case Material::bark:
+    case Material::leaf:
+      return SurfaceClass::tree;
+    case Material::water:
+      return SurfaceClass::water;
+    case Material::wood:
+    case Material::wire:
+    case Material::lamp:
+      return SurfaceClass::wire;
+    case Material::carPaint:
+    case Material::carGlass:
+    case Material::rubber:
+      break;
+  }
+  return SurfaceClass::car;
+}
+
 uint32_t SurfaceMesh::addObject(const SurfaceObject& object) {
   objects.push_back(object);
   return static_cast<uint32_t>(objects.size() - 1);

@@ -25,11 +25,26 @@ enum class Material : uint16_t {
   water,
   bark,
   leaf,
-  wood,
+  wood,  // poles
+  wire,
+  lamp,
   carPaint,
   carGlass,
   rubber
 };
+
+// What people would call the thing that a surface belongs to.
+enum class SurfaceClass : uint8_t {
+  ground,  // streets, pavements, lawns, the country
+  facade,  // also gables, balconies, chimneys
+  roof,    // with parapets and what stands on it
+  tree,
+  water,
+  wire,  // wires, their poles, and street lamps
+  car
+};
+inline constexpr int kSurfaceClasses = 7;
+SurfaceClass classOfMaterial(Material material);
 
 // The object that a face belongs to. Each wall is an object of its own, because its size determines where windows are.
 struct SurfaceObject {

@@ -15,6 +15,7 @@
 
 #include "scene/block_grid.h"
 #include "scene/capture.h"
+#include "scene/surface_coverage.h"
 
 namespace tessera {
 
@@ -108,7 +109,8 @@ struct Tileset {
   uint32_t levels = 1;
   double geometricError = 0;  // metres: error of drawing nothing at all; at least the root's
   std::vector<SharedResource> resources;
-  std::vector<Tile> tiles;  // the root first
+  std::vector<SurfaceCoverage> coverage;  // of the finest level, for people; empty if it was not checked
+  std::vector<Tile> tiles;                // the root first
 
   const Tile& root() const { return tiles.front(); }
   SceneBox box() const;

@@ -7,6 +7,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "scene/surface_coverage_json.h"
 
 namespace tessera {
 namespace {
@@ -99,6 +100,7 @@ Json sceneToJson(const Tileset& tileset) {
     if (resource.bytes > 0) entry["bytes"] = resource.bytes;
     scene["resources"].push_back(std::move(entry));
   }
+  if (!tileset.coverage.empty()) scene["coverage"] = coverageToJson(tileset.coverage);
   return scene;
 }
 

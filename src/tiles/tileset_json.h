@@ -17,7 +17,7 @@ inline constexpr uint32_t kMaxCells = 4096;  // of the grid, along an axis
 struct TilesetLimits {
   size_t textBytes = size_t{16} << 20;
   uint32_t tiles = 1 << 16, depth = 64;
-  uint32_t contentsOfTile = 64, resources = 1 << 16;
+  uint32_t contentsOfTile = 64, resources = 1 << 16, coverage = 1 << 16;
 };
 
 // The same tileset gives the same text. Throws Error if it exceeds what readers accept or its `near` is out of bounds,

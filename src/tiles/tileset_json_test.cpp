@@ -19,6 +19,7 @@ void expectSame(const Tileset& a, const Tileset& b) {
   EXPECT_EQ(a.worldFromScene.rotation, b.worldFromScene.rotation);
   EXPECT_EQ(a.sourceFromWorld, b.sourceFromWorld);
   EXPECT_EQ(a.background, b.background);
+  EXPECT_EQ(a.coverage, b.coverage);
   ASSERT_EQ(a.tiles.size(), b.tiles.size());
   for (size_t i = 0; i < a.tiles.size(); ++i) {
     const Tile &one = a.tiles[i], &other = b.tiles[i];
@@ -45,6 +46,7 @@ TEST(TilesetJson, RoundTripsTilesets) {
       Tileset tileset = testTileset(3, georeferenced);
       tileset.representation = representation;
       tileset.near = 0.1 + 0.2;  // no short decimal
+      if (georeferenced) tileset.coverage = {{"block_1_0", 5000000000, 12}, {"block_0_0", 7, 0}};
       std::string reason;
       const auto again = decodeTileset(encodeTileset(tileset), reason);
       ASSERT_TRUE(again) << reason;
@@ -160,6 +162,22 @@ TEST_F(TilesetJsonRefusal, RejectsInvalidNumbers) {
   refuses("tile 1: its level", [](json& file) { file["root"]["children"][0].erase("geometricError"); });
   refuses("tile 1: its level", [](json& file) { ours(file["root"]["children"][0])["cells"][1] = -1; });
   refuses("tile 1: its level", [](json& file) { ours(file["root"]["children"][0])["cells"] = {0, 0, 1}; });
+}
+
+TEST_F(TilesetJsonRefusal, RejectsImpossibleCoverage) {
+  const json part = {{"part", "block_0_0"}, {"pixels", 10}, {"holes", 10}};
+  const auto changed = [&](const char* key, const json& value) {
+    json other = part;
+    other[key] = value;
+    return [other](json& file) { ours(file)["coverage"] = json::array({other}); };
+  };
+  refuses("the coverage is not a list", [&](json& file) { ours(file)["coverage"] = part; });
+  refuses("the coverage is not a list", changed("part", "block_0_0"), {.coverage = 0});
+  refuses("the coverage of a part lacks", changed("part", 3));
+  refuses("the coverage of a part lacks", changed("pixels", -1));
+  refuses("the coverage of a part lacks", changed("pixels", 1e300));
+  refuses("the coverage of a part lacks", changed("holes", 0.5));
+  refuses("the coverage of a part counts more holes than pixels", changed("holes", 11));
 }
 
 TEST_F(TilesetJsonRefusal, RejectsInconsistentTrees) {

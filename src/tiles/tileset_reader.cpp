@@ -43,6 +43,8 @@ std::optional<CellRange> readCells(const json& object) {
   return CellRange{{numbers[0], numbers[1]}, {numbers[2], numbers[3]}};
 }
 
+constexpr uint64_t kMaxCoveragePixels = uint64_t{1} << 53;
+
 // Returns the byte count of a file, which is a hint; 0 if it is not a number.
 uint64_t getByteCount(const json& object) {
   const json* field = getField(object, "bytes");
@@ -54,7 +56,8 @@ class TilesetReader {
   TilesetReader(std::string& reason, const TilesetLimits& limits) : reason_(reason), limits_(limits) {}
 
   std::optional<Tileset> read(const json& file) {
-    if (!readAsset(file) || !readScene(*tesseraExtension(file)) || !readResources(*tesseraExtension(file)))
+    if (!readAsset(file) || !readScene(*tesseraExtension(file)) || !readResources(*tesseraExtension(file)) ||
+        !readCoverage(*tesseraExtension(file)))
       return std::nullopt;
     const auto error = getNumber(file, "geometricError");
     const json* root = getField(file, "root");
@@ -153,6 +156,22 @@ class TilesetReader {
       const std::string *uri = getString(resource, "uri"), *mimeType = getString(resource, "mimeType");
       if (!uri || !mimeType) return fail("a shared resource has no uri or no mimeType");
       tileset_.resources.push_back({*uri, *mimeType, getByteCount(resource)});
+    }
+    return true;
+  }
+
+  bool readCoverage(const json& ours) {
+    const json* coverage = getField(ours, "coverage");
+    if (!coverage) return true;
+    if (!coverage->is_array() || coverage->size() > limits_.coverage)
+      return fail("the coverage is not a list of parts");
+    for (const json& part : *coverage) {
+      const std::string* name = getString(part, "part");
+      const json *pixels = getField(part, "pixels"), *holes = getField(part, "holes");
+      const auto all = pixels ? unsignedFrom(*pixels, kMaxCoveragePixels) : std::nullopt,
+                 open = holes ? unsignedFrom(*holes, kMaxCoveragePixels) : std::nullopt;
+      if (!name || !all || !open) return fail("the coverage of a part lacks its name or its numbers");
+      tileset_.coverage.push_back({*name, *all, *open});
     }
     return true;
   }

@@ -110,6 +110,12 @@ Broken ruleOfResources(const Tileset& tileset) {
   return std::nullopt;
 }
 
+Broken ruleOfCoverage(const Tileset& tileset) {
+  for (const SurfaceCoverage& part : tileset.coverage)
+    if (part.holes > part.pixels) return "the coverage of a part counts more holes than pixels";
+  return std::nullopt;
+}
+
 // Checks the background blocks of the root: finer ones must have smaller texels.
 Broken ruleOfBackgroundBlocks(const Tileset& tileset) {
   std::map<uint32_t, double> errors;
@@ -226,6 +232,7 @@ std::optional<std::string> validationError(const Tileset& tileset) {
   if (!isName(tileset.representation)) return "the representation's name is not valid";
   if (auto broken = ruleOfFrames(tileset)) return broken;
   if (auto broken = ruleOfResources(tileset)) return broken;
+  if (auto broken = ruleOfCoverage(tileset)) return broken;
   if (!(tileset.geometricError >= tileset.root().geometricError && tileset.geometricError <= kFarthest)) {
     return "the tileset's geometric error is below its root's";
   }

@@ -14,6 +14,7 @@
 #include "base/check.h"
 #include "base/config.h"
 #include "compute/device.h"
+#include "scene/surface_coverage.h"
 #include "scene/view_renderer.h"
 #include "train/block_run.h"
 #include "train/step_benchmark.h"
@@ -133,6 +134,10 @@ struct Method {
 
   // Returns the sizes of a model with these settings, by the keys of `tessera info`.
   std::vector<std::pair<std::string, uint64_t>> (*describe)(const MethodSettings& settings) = nullptr;
+
+  // Returns how well the surfaces of a trained model cover what its photos show, for the parts of which training has
+  // checked it. Throws Error if the model cannot be read.
+  std::vector<SurfaceCoverage> (*readCoverage)(const fs::path& model) = nullptr;
 
   // Times whole training steps on fixed samples.
   StepBenchmark (*benchmarkStep)(Device& device, const StepBenchmarkOptions& options) = nullptr;

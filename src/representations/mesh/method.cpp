@@ -89,6 +89,7 @@ const Method& meshMethod() {
       .openBaker = openBaker,
       .bakeParameters = kBakeParameters,
       .describe = describe,
+      .readCoverage = readMeshCoverage,
   };
   return kMethod;
 }

@@ -68,7 +68,10 @@ class MeshBaker final : public Baker {
   }
 
   SceneDescription description() const override {
-    return {kMeshName, grid_, mesh_.parts.front()->config().near * tilesPerBlock_, kHazySky};
+    SceneDescription about{kMeshName, grid_, mesh_.parts.front()->config().near * tilesPerBlock_};
+    for (const auto& part : mesh_.parts)
+      if (part->atlas() && part->atlas()->coverage.pixels > 0) about.coverage.push_back(part->atlas()->coverage);
+    return about;
   }
 
   void bake(const Capture& given, const BakeOptions& options, ContentSink& sink) override {

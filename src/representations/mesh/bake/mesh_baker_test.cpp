@@ -92,6 +92,8 @@ TEST_F(BakeMeshScene, LooksAsTheModelAtItsFinestLevel) {
   EXPECT_LT(compare(*coarse, renderer), psnr) << "the coarsest level has less detail";
   EXPECT_EQ(baked.levels[0].counts[0].first, "triangles");
   EXPECT_LT(baked.levels[1].counts[0].second, baked.levels[0].counts[0].second);
+  EXPECT_EQ(baked.tileset.coverage.size(), 2u);
+  EXPECT_EQ(baked.tileset.coverage, readMeshCoverage(model()));
 }
 
 TEST_F(BakeMeshScene, GivesTheSameBytesAgainAndTheSameImageFromOtherTiles) {

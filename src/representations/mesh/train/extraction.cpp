@@ -78,6 +78,7 @@ class HoleCounter final : public RayFollower {
         counters_(model.device().array<uint32_t>(MeshHits::kCounters)),
         logits_(model.device().array<float>(kExtractionSamples)) {
     hits_.counters = counters_;
+    coverage_.part = model.part().name;
     model.field().reserve(kExtractionSamples);
   }
 
@@ -101,14 +102,14 @@ class HoleCounter final : public RayFollower {
     }
     return followed;
   }
-  const Coverage& coverage() const { return coverage_; }
+  const SurfaceCoverage& coverage() const { return coverage_; }
 
  private:
   MeshModel& model_;
   MeshHits hits_;
   Array<uint32_t> counters_;
   Array<float> logits_;
-  Coverage coverage_;
+  SurfaceCoverage coverage_;
 };
 
 // Adds the neighbours of the faces that are opaque enough in their middle.
@@ -224,7 +225,7 @@ void followRays(MeshModel& model, uint32_t level, const Capture& capture, const 
   }
 }
 
-Coverage checkCoverage(MeshModel& model, const Capture& capture, const std::vector<TileShares>& tiles) {
+SurfaceCoverage checkCoverage(MeshModel& model, const Capture& capture, const std::vector<TileShares>& tiles) {
   HoleCounter counter(model);
   PhotoFaces middles(model, counter);
   PhotoVisitor visitor(capture, model.frame(), RayFollower::kMaxRays, middles);

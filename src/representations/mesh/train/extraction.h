@@ -57,12 +57,8 @@ void followRays(MeshModel& model, uint32_t level, const Capture& capture, const 
                 const ExtractionSettings& settings, RayFollower& follower,
                 const std::function<void(int64_t done, int64_t all)>& onPhoto);
 
-// How well the faces of the finest level, if they are fixed (MeshModel::atlas), cover what photos show of a part.
-struct Coverage {
-  uint64_t pixels = 0, holes = 0;  // less than half opaque
-};
-// Looks at the middles of the tiles.
-Coverage checkCoverage(MeshModel& model, const Capture& capture, const std::vector<TileShares>& tiles);
+// Checks the faces of the finest level, if they are fixed (MeshModel::atlas), at the middles of the tiles.
+SurfaceCoverage checkCoverage(MeshModel& model, const Capture& capture, const std::vector<TileShares>& tiles);
 
 // Returns the faces of a level of a block that the training photos of `capture` and parallel rays see. `tiles`:
 // [photo], the parts of the photos that are looked through; whole photos if it is null. Throws Error if a mask cannot

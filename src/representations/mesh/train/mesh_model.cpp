@@ -12,6 +12,7 @@ namespace {
 
 constexpr uint32_t kPointsPerCell = 16;  // at which the opacities of cells are compared
 constexpr uint32_t kPointsAtATime = 1 << 16;
+constexpr const char* kCoverageTensor = "atlas.coverage";  // pixels, holes
 
 bool isSet(const std::vector<uint32_t>& bits, size_t i) {
   return (bits[i / 32] >> i % 32 & 1) != 0;
@@ -54,6 +55,16 @@ FaceSet restoreFaces(const fs::path& path, const Safetensors& file, const std::s
 }
 
 }  // namespace
+
+std::optional<SurfaceCoverage> readCoverage(const MeshPart& part, const fs::path& path, const Safetensors& checkpoint) {
+  if (!checkpoint.tensors.contains(kCoverageTensor)) return std::nullopt;
+  const auto numbers = checkpoint.require(path, kCoverageTensor, TensorType::u32).as<uint32_t>();
+  if (numbers.size() != 2 || numbers[0] == 0 || numbers[1] > numbers[0]) {
+    throw Error(path.string(), kCoverageTensor, "is not a number of pixels and a part of it",
+                "restore the checkpoint or train again");
+  }
+  return SurfaceCoverage{part.name, numbers[0], numbers[1]};
+}
 
 MeshModel::MeshModel(Device& device, const MeshConfig& config, const MeshPart& part)
     : device_(device),
@@ -159,6 +170,10 @@ void MeshModel::save(TensorSet& tensors, bool withMoments) {
   tensors.add("atlas.patch_edge", std::vector<uint32_t>{atlas_->patchEdge});
   tensors.add("atlas.ranges", atlas_->ranges);
   saveFaces(tensors, "atlas.", atlas_->faces);
+  if (const SurfaceCoverage& checked = atlas_->coverage; checked.pixels > 0) {
+    tensors.add(kCoverageTensor,
+                std::vector<uint32_t>{static_cast<uint32_t>(checked.pixels), static_cast<uint32_t>(checked.holes)});
+  }
   for (uint32_t number = 1; coarseAtlas(number) != nullptr; ++number) {
     saveFaces(tensors, MeshLevel::tensorPrefix(number) + "atlas.", coarseAtlas(number)->faces);
     tensors.add(device_, coarseAtlas(number)->texels, withMoments);
@@ -195,6 +210,7 @@ void MeshModel::restoreAtlas(const fs::path& path, const Safetensors& file) {
   atlas.patchEdge = edge[0];
   atlas.faces = restoreFaces(path, file, "atlas.", level(0).domain());
   atlas.ranges.assign(ranges.begin(), ranges.end());
+  atlas.coverage = readCoverage(part_, path, file).value_or(SurfaceCoverage());
   setAtlas(std::move(atlas));
   for (uint32_t number = 1; number < levels(); ++number) {
     const std::string prefix = MeshLevel::tensorPrefix(number);

@@ -9,6 +9,7 @@
 #include "representations/mesh/train/mesh_field.h"
 #include "representations/mesh/train/mesh_level.h"
 #include "representations/mesh/train/mesh_part.h"
+#include "scene/surface_coverage.h"
 
 namespace tessera {
 
@@ -24,7 +25,11 @@ struct MeshAtlas {
   uint32_t patchEdge = 0;  // texels along the edge of a patch
   FaceSet faces;
   std::vector<float> ranges;  // of the features, [MeshField::kFeatures][2]
+  SurfaceCoverage coverage;   // of the faces, when it was last checked; without pixels if it was not
 };
+
+// Returns the coverage in a checkpoint of a part; nothing if it was not checked. Throws Error if it is malformed.
+std::optional<SurfaceCoverage> readCoverage(const MeshPart& part, const fs::path& path, const Safetensors& checkpoint);
 
 // The same of a coarser level, whose texels are parameters of their own, with the ranges of the finest level.
 struct CoarseAtlas {
@@ -53,6 +58,7 @@ class MeshModel {
   const std::optional<MeshAtlas>& atlas() const { return atlas_; }
   void setAtlas(MeshAtlas atlas);
   void setAtlasRanges(std::vector<float> ranges) { atlas_->ranges = std::move(ranges); }
+  void setCoverage(SurfaceCoverage coverage) { atlas_->coverage = std::move(coverage); }
   // Also removes the coarser levels, if they were fitted to it.
   void removeAtlas();
   // Of a coarser level that was fitted; null if it was not, and for level 0.

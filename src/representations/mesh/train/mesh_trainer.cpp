@@ -124,11 +124,7 @@ void MeshTrainer::beginFinalStage() {
     if (atlas.faces.count() == 0) warn("{}: no triangle is opaque enough to be kept", model_.part().name);
     atlas.ranges.resize(2 * MeshField::kFeatures);  // they are found below
     model_.setAtlas(std::move(atlas));
-    if (!model_.part().isBackground()) {
-      const Coverage coverage = checkCoverage(model_, capture_, tiles_);
-      inform("{}: {} triangles; {} of {} pixels that show a surface in it have a hole", model_.part().name,
-             model_.atlas()->faces.count(), coverage.holes, coverage.pixels);
-    }
+    updateCoverage("before");
   }
   TexelAtlas texels(model_, 0, model_.atlas()->faces, model_.atlas()->patchEdge);
   if (isNew) model_.setAtlasRanges(texels.findRanges(model_));
@@ -142,6 +138,14 @@ void MeshTrainer::beginFinalStage() {
     TexelAtlas coarse(model_, level, model_.coarseAtlas(level)->faces, model_.atlas()->patchEdge);
     finalStage_.push_back(std::make_unique<AtlasStage>(model_, level, std::move(coarse), maxRays, hits));
   }
+}
+
+void MeshTrainer::updateCoverage(const char* when) {
+  if (model_.part().isBackground()) return;
+  const SurfaceCoverage coverage = checkCoverage(model_, capture_, tiles_);
+  inform("{}: {} triangles; {} the final stage, {} of {} pixels that show a surface in it have a hole", coverage.part,
+         model_.atlas()->faces.count(), when, coverage.holes, coverage.pixels);
+  model_.setCoverage(coverage);
 }
 
 void MeshTrainer::fitCoarseLevel(uint32_t level) {
@@ -182,6 +186,7 @@ StepReport MeshTrainer::finalStep(int64_t step, int64_t plannedSteps) {
   if (report.rays < photoRays_.count()) target = std::min<double>(target, report.rays);
   constexpr double kRaysOfSquare = kSquareOfRays * kSquareOfRays;
   budget_.aimFor(std::ceil(target / kRaysOfSquare) * kRaysOfSquare);
+  if (step + 1 == plannedSteps) updateCoverage("after");  // opacities have changed since the stage began
   return report;
 }
 

@@ -34,6 +34,8 @@ class MeshTrainer final : public TrainableModel {
   // The final stage: its atlas is made before its first step.
   bool isFinalStage(int64_t step, int64_t plannedSteps) const;
   void beginFinalStage();
+  // Counts and reports the pixels of a block that its faces do not cover; `when`, relative to the final stage.
+  void updateCoverage(const char* when);
   void fitCoarseLevel(uint32_t level);
   // Trains the texels of coarser levels on the rays of the step. done: share of the final stage.
   void updateCoarseTexels(double done);

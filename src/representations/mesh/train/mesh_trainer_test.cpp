@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "base/error.h"
 #include "representations/field/testing/trained_cube.h"
 #include "representations/mesh/testing/small_mesh.h"
 #include "representations/mesh/train/extraction.h"
@@ -187,13 +188,44 @@ TEST(Extraction, CountsThePixelsThatFacesDoNotCover) {
   atlas.patchEdge = 8;
   atlas.faces = extractFaces(model, 0, scene.capture(), nullptr, {});
   model.setAtlas(atlas);
-  const Coverage all = checkCoverage(model, scene.capture(), tiles);
+  const SurfaceCoverage all = checkCoverage(model, scene.capture(), tiles);
   EXPECT_EQ(all.pixels, pixels);
   EXPECT_LT(all.holes, pixels / 20);
   model.removeAtlas();
   atlas.faces = FaceSet(model.level(0).domain().grids);
   model.setAtlas(std::move(atlas));
   EXPECT_EQ(checkCoverage(model, scene.capture(), tiles).holes, pixels) << "nothing is left";
+}
+
+TEST(MeshTrainer, StatesHowWellTheBlockCoversWhatPhotosShowInTheEnd) {
+  const CubeScene scene;
+  constexpr int64_t kSteps = 100;
+  CubeTraining trained(scene, smallMeshConfig(), 0, 2, startAtCube);
+  MeshModel& model = trained.trainer->model();
+  const std::vector<TileShares> tiles = startAtCube(scene, model.level(0).domain()).tiles;
+  SurfaceCoverage first;
+  for (int64_t step = 0; step < kSteps; ++step) {
+    trained.trainer->step(step, kSteps);
+    if (model.atlas() && first.pixels == 0) first = model.atlas()->coverage;
+  }
+  const SurfaceCoverage last = model.atlas()->coverage;
+  EXPECT_EQ(last.part, "block_0_0");
+  EXPECT_EQ(last, checkCoverage(model, scene.capture(), tiles));
+  EXPECT_EQ(last.pixels, first.pixels);
+  EXPECT_NE(last.holes, first.holes) << "the final stage changes opacities";
+}
+
+TEST(MeshModel, RefusesAnImpossibleCoverage) {
+  const MeshPart part{"block_0_0", 0, {}, {1, 1, 1}};
+  const auto read = [&](const std::vector<uint32_t>& numbers) {
+    TensorSet tensors;
+    tensors.add("atlas.coverage", numbers);
+    return readCoverage(part, "state", *decodeSafetensors(tensors.encode({})));
+  };
+  EXPECT_EQ(read({9, 2}), (SurfaceCoverage{"block_0_0", 9, 2}));
+  for (const std::vector<uint32_t>& numbers : std::vector<std::vector<uint32_t>>{{9}, {9, 10}, {0, 0}, {9, 2, 1}})
+    EXPECT_THROW(read(numbers), Error);
+  EXPECT_FALSE(readCoverage(part, "state", *decodeSafetensors(TensorSet().encode({}))));
 }
 
 TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {

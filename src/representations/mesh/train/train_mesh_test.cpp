@@ -86,6 +86,24 @@ TEST_F(TrainMesh, TrainsPartsAloneToTheSameBytes) {
   EXPECT_EQ(lastCheckpoints(scene / "apart"), lastCheckpoints(scene / "whole"));
 }
 
+TEST_F(TrainMesh, RecordsHowWellBlocksCoverWhatPhotosShow) {
+  TrainMeshOptions options = smallOptions();
+  options.only = {"coarse", "background", "block_1_0"};
+  EXPECT_TRUE(train("mesh", options).finished);
+  const std::vector<SurfaceCoverage> coverage = readMeshCoverage(scene / "mesh");
+  ASSERT_EQ(coverage.size(), 1u) << "what is outside of the blocks is not checked";
+  EXPECT_EQ(coverage[0].part, "block_1_0");
+  EXPECT_GT(coverage[0].pixels, 0u);
+  EXPECT_LE(coverage[0].holes, coverage[0].pixels);
+  const TrainedMesh mesh = loadTrainedMesh(*device, scene / "mesh");
+  EXPECT_EQ(mesh.parts.front()->atlas()->coverage, coverage[0]);
+
+  options.config.finalShare = 0;
+  EXPECT_TRUE(train("without", options).finished);
+  EXPECT_TRUE(readMeshCoverage(scene / "without").empty()) << "its faces are extracted when it is baked";
+  EXPECT_THROW(readMeshCoverage(scene / "nothing"), Error);
+}
+
 TEST_F(TrainMesh, RefusesPartsThatDoNotExist) {
   TrainMeshOptions options = smallOptions();
   options.only = {"block_2_0"};

@@ -6,23 +6,47 @@
 
 namespace tessera {
 
+namespace {
+
+// Calls use(part, file, checkpoint) for the parts that have been trained, one at a time.
+template <class Use>
+void forEachCheckpoint(const fs::path& folder, const MeshConfig& config, const BlockGrid& grid, const Use& use) {
+  for (const MeshPart& part : makeMeshParts(grid, config.hasBackground())) {
+    const ModelFolder trained = partFolder(folder, part);
+    const std::optional<ModelManifest> manifest = trained.manifest();
+    if (!manifest) continue;
+    const fs::path file = trained.root() / manifest->files.at(0);
+    use(part, file, readSafetensors(file));
+  }
+}
+
+}  // namespace
+
 TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder) {
   const ModelFolder root(folder);
   requireManifest(root, "mesh");
   MeshConfig config;
   configFromToml(config.fields(), root.configPath());
   TrainedMesh mesh{&device, requireGrid(root), {}, folder};
-  for (const MeshPart& part : makeMeshParts(mesh.grid, config.hasBackground())) {
-    const ModelFolder trained = partFolder(folder, part);
-    const std::optional<ModelManifest> manifest = trained.manifest();
-    if (!manifest) continue;
-    mesh.parts.push_back(std::make_unique<MeshModel>(device, config, part));
-    const fs::path file = trained.root() / manifest->files.at(0);
-    mesh.parts.back()->restore(file, readSafetensors(file));
-  }
+  forEachCheckpoint(folder, config, mesh.grid,
+                    [&](const MeshPart& part, const fs::path& file, const Safetensors& checkpoint) {
+                      mesh.parts.push_back(std::make_unique<MeshModel>(device, config, part));
+                      mesh.parts.back()->restore(file, checkpoint);
+                    });
   if (mesh.parts.empty())
     throw Error(folder.string(), "parts", "none has been trained yet", "go on with tessera train ... --resume");
   return mesh;
+}
+
+std::vector<SurfaceCoverage> readMeshCoverage(const fs::path& folder) {
+  const ModelFolder root(folder);
+  requireManifest(root, "mesh");
+  std::vector<SurfaceCoverage> coverage;
+  forEachCheckpoint(folder, savedConfig<MeshConfig>(folder), requireGrid(root),
+                    [&](const MeshPart& part, const fs::path& file, const Safetensors& checkpoint) {
+                      if (const auto checked = readCoverage(part, file, checkpoint)) coverage.push_back(*checked);
+                    });
+  return coverage;
 }
 
 void writeMeshManifest(const fs::path& folder, const std::vector<MeshPart>& parts) {

@@ -28,6 +28,10 @@ struct TrainedMesh {
 // trained.
 TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder);
 
+// Returns how well the blocks cover what their photos show. Reads the checkpoints of all parts, one at a time. Throws
+// Error as loadTrainedMesh does, except if no part has been trained.
+std::vector<SurfaceCoverage> readMeshCoverage(const fs::path& folder);
+
 // Writes the manifest of the mesh, which sums up those of its parts. Throws Error if it cannot be written.
 void writeMeshManifest(const fs::path& folder, const std::vector<MeshPart>& parts);
 
