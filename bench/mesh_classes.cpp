@@ -31,7 +31,7 @@ constexpr float kOpaqueFrom = 0.5f;
 // Draws contents whose texels are either opaque or transparent.
 class BinarisingDrawer final : public ChangedMeshDrawer {
  public:
-  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
+  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content, int threads) const override {
     MeshContent mesh = contentAs<MeshContent>(*content);
     for (PatchSet& part : mesh.parts) {
       if (part.encoder) part.encoder->opaqueFrom = part.encoder->transparentBelow = kOpaqueFrom;  // of inferred maps
@@ -43,7 +43,7 @@ class BinarisingDrawer final : public ChangedMeshDrawer {
         std::copy(block.begin(), block.end(), part.opacityBlocks.begin() + static_cast<ptrdiff_t>(at));
       }
     }
-    return ChangedMeshDrawer::prepare(makeContent(std::move(mesh)));
+    return ChangedMeshDrawer::prepare(makeContent(std::move(mesh)), threads);
   }
 };
 
