@@ -239,8 +239,8 @@ alpha() {
   classified city-mesh city classes
   classified city-mesh city binarised --binarised
   for of in all trees water; do
-    jq -r --arg of "$of" --slurpfile binarised "$work/city-mesh.binarised.json" '.[0][$of] as $as |
-      $binarised[0][0][$of] as $bits | "city 2x2, \($of), \($as.pixels) pixels: opacities as trained \($as.psnr) dB, " +
+    jq -r --arg of "$of" --slurpfile binarised "$work/city-mesh.binarised.json" '.[0][$of] as $stored |
+      $binarised[0][0][$of] as $bits | "city 2x2, \($of), \($stored.pixels) pixels: opacities as trained \($stored.psnr) dB, " +
       "binarised at 0.5 \($bits.psnr) dB"' "$work/city-mesh.classes.json"
   done
 }
