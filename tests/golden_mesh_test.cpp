@@ -73,7 +73,7 @@ TEST(GoldenMesh, RendersItsRaysAsTheDefinitionSays) {
   const std::unique_ptr<CpuDrawer> drawer = makeMeshDrawer();
   std::vector<std::unique_ptr<Content>> contents;
   for (size_t i = 0; i < scene.tree.tiles.size(); ++i)
-    contents.push_back(drawer->prepare(scene.source.load(static_cast<int>(i))));
+    contents.push_back(drawer->prepare(scene.source.load(static_cast<int>(i)), 1));
   const auto contentAt = [&](int tile) { return contents[static_cast<size_t>(tile)].get(); };
   const nlohmann::ordered_json rays = readGoldenJson(kMeshScene / "rays.json");
   EXPECT_EQ(rays.size(), 72u);
