@@ -81,7 +81,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       dilationSetting(),
       patchTexelsSetting(),
       distortionWeightSetting(),
-      depthWeightSetting(),
+      depthWeightSetting().byDefault(1),
       depthToleranceSetting(),
       sparseDepthRayFractionSetting(),
       exposureSetting(),
