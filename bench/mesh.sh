@@ -9,7 +9,8 @@
 #   levels       that scene's coarser levels in views whose pixels match their texels: photos of half the size for level 1, of a
 #                quarter for level 2, against the next finer level in the same views; triangles relative to the next finer level
 #   final        one block of the city with and without the final stage, in the same time, three seeds; the whole city likewise,
-#                once; what each step from its model to contents loses, and what opacities of 0 and 1 alone would
+#                once; what each step from its model to contents loses, how many faces are kept, and what opacities of 0
+#                and 1 alone would lose
 #   holes        200 fresh views of that city from other heights: the share of pixels in which the scene's blocks have a hole, at the
 #                finest level and with levels mixed
 #   losses       one block with both losses and with the first alone, without the final stage, three seeds: PSNR of the scenes
@@ -83,6 +84,13 @@ chained() {
       "$program" "$work/$1" "$work/$2" "$edge" > "$file.part"
       mv "$file.part" "$file"
     fi
+    verdict "$1, share of the faces in the blocks that are kept" "$(jq .kept_share "$file")" '<=' 0.05
+    verdict "$1, faces kept for each cell with some" "$(jq .kept_per_cell "$file")" '<=' 6
+    verdict "$1, loss by dropped faces in dB" "$(shortfall "$(jq .model.psnr "$file")" "$(jq .kept_faces.psnr "$file")")" '<=' 0.5
+    verdict "$1, loss by texels of 8 bits, $edge along an edge, in dB" \
+      "$(shortfall "$(jq .kept_faces.psnr "$file")" "$(jq .texels_of_8_bits.psnr "$file")")" '<=' 0.35
+    verdict "$1, loss by BC4 in dB" \
+      "$(shortfall "$(jq '.["opaque_from_0.8"].psnr' "$file")" "$(jq .bc4_fast.psnr "$file")")" '<=' 0.1
     jq -r --arg edge "$edge" '"patches of \($edge) texels: model \(.model.psnr), faces kept \(.kept_faces.psnr), " +
       "8 bits \(.texels_of_8_bits.psnr), opacities of 0 and 1 alone \(.["binarised_at_0.5"].psnr), " +
       "as stored, opaque from 0.8 \(.["opaque_from_0.8"].psnr) with \(.["opaque_from_0.8"].hits_per_ray) hits a ray, " +

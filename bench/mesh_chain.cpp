@@ -2,7 +2,8 @@
 // Evaluates held-out photos with the model; with the faces that extraction keeps; with the triangles of all parts and
 // their texels of 8 bits, traced by Embree; with opacities that are 0 or 1 alone; with those that contents store; and
 // with these after BC4 compression. At most TRIANGLES faces are kept, those that contribute most. Prints PSNR, SSIM,
-// hits per ray, and numbers of faces, patches and bytes as JSON. See mesh.sh.
+// hits per ray, and numbers of faces, patches and bytes as JSON; of the blocks also the kept share of the faces in
+// their boxes, and the kept faces for each cell in which there are some. See mesh.sh.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/error.h"
 #include "base/threads.h"
@@ -19,6 +21,7 @@
 #include "import/capture_reader.h"
 #include "representations/mesh/bake/bake_mesh.h"
 #include "representations/mesh/cpu/mesh_tracer.h"
+#include "representations/mesh/train/mesh_patches.h"
 #include "representations/mesh/train/mesh_renderer.h"
 
 namespace tessera {
@@ -144,6 +147,31 @@ void limitFaces(std::vector<FaceSet>& faces, size_t most) {
   faces = reduced(high);
 }
 
+// The faces of blocks, with centres in their boxes.
+struct BlockFaces {
+  double all = 0, kept = 0, cells = 0;  // cells: that contain the centre of a kept face
+
+  void add(MeshModel& model, const FaceSet& faces) {
+    const OctahedraDomain& domain = model.level(0).domain();
+    const OctahedraGrid& own = domain.ownGrids[0];
+    double cellsOfBox = 1;
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const auto limited = [&](float at) { return std::clamp(at, 0.0f, static_cast<float>(own.resolution)); };
+      cellsOfBox *= limited(own.highest[axis]) - limited(own.lowest[axis]);
+    }
+    all += cellsOfBox * kFacesPerCell / (own.placement == OctahedraPlacement::all ? 1 : 2);
+    const TriangleList list = listTriangles(
+        domain.grids, domain.ownGrids, model.device().read(model.level(0).displacements().values.all()), faces.bits());
+    kept += static_cast<double>(list.triangles.size());
+    std::set<uint32_t> places;
+    for (const auto& triangle : list.triangles) {
+      const Vec3d sum = list.vertices[triangle[0]] + list.vertices[triangle[1]] + list.vertices[triangle[2]];
+      if (const auto cell = domain.latticeCell(sum / 3)) places.insert(*cell);
+    }
+    cells += static_cast<double>(places.size());
+  }
+};
+
 nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& captureFolder, uint32_t patchEdge,
                                size_t most) {
   using Clock = std::chrono::steady_clock;
@@ -173,7 +201,13 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
     result["faces"].push_back(faces.back().count());
   }
   limitFaces(faces, most);
-  for (size_t i = 0; i < faces.size(); ++i) mesh.parts[i]->level(0).keepFaces(faces[i].bits());
+  BlockFaces blocks;
+  for (size_t i = 0; i < faces.size(); ++i) {
+    mesh.parts[i]->level(0).keepFaces(faces[i].bits());
+    if (!mesh.parts[i]->part().isBackground()) blocks.add(*mesh.parts[i], faces[i]);
+  }
+  result["kept_share"] = blocks.kept / blocks.all;
+  result["kept_per_cell"] = blocks.kept / blocks.cells;
   result["extraction_seconds"] = seconds(extracting);
   evaluateAs("kept_faces", renderer);
 
