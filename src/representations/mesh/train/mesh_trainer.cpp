@@ -8,8 +8,6 @@
 #include "compute/composite.h"
 #include "compute/cube_map.h"
 #include "compute/losses.h"
-#include "representations/mesh/train/extraction.h"
-#include "representations/mesh/train/level_fit.h"
 #include "representations/mesh/train/mesh_schedule.h"
 #include "train/colour_loss.h"
 
@@ -25,12 +23,7 @@ constexpr uint32_t kRaysPerCoarseRay = 4;
 constexpr int64_t kUpdatesPerExploration = 8;
 constexpr float kMinTrainingTransmittance = 1e-4f;
 constexpr double kFinalVertexFactor = 0.01;
-// In the final stage, rays are drawn as squares of neighbouring pixels: their hits share texels, at which the encoder
-// is evaluated once.
-constexpr uint32_t kSquareOfRays = 2;
 constexpr double kFinalStageRate = 0.3;  // of the learning rate, at the beginning of the final stage
-// Of the texels of coarser levels, at the beginning; and what remains of it at the end.
-constexpr double kTexelRate = 0.1, kFinalTexelFactor = 0.1;
 // With `--minutes`, the number of steps is known only after a quarter of the time: until then the rate must not depend
 // on it.
 constexpr double kConstantVertexFraction = 0.3;
@@ -40,14 +33,6 @@ PhotoRays::Settings raySettings(const MeshConfig& config) {
   settings.randomBackground = config.randomBackground;
   if (config.depthWeight <= 0) settings.sparseDepthRayFraction = 0;
   return settings;
-}
-
-// Returns the stride at which a cell has four rays along an edge, at least 1.
-int findPhotoStride(double pixelWidth, const OctahedraDomain& domain) {
-  constexpr double kRaysAcrossCell = 4, kMaxStride = 4;
-  if (pixelWidth <= 0) return 1;
-  const double cell = 1 / domain.grids[0].gridFromScene[0];
-  return static_cast<int>(std::clamp(cell / kRaysAcrossCell / pixelWidth, 1.0, kMaxStride));
 }
 
 }  // namespace
@@ -60,26 +45,23 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
       model_(device, config, part),
       photoRays_(device, capture, part.frame, raySettings(config)),
       photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
-      budget_(config) {
+      budget_(config),
+      finalStage_(model_, capture, start.tiles, start.pixelWidth) {
   model_.level(0).exclude(start.cells);
   if (!start.displacements.empty())
     device.write(model_.level(0).displacements().values.all(), std::span<const float>(start.displacements));
   const double pixels = start.pixels();
-  tiles_ = start.tiles;
-  pixelWidth_ = start.pixelWidth;
   photoRays_.drawFrom(std::move(start.tiles));
   const uint32_t rays = static_cast<uint32_t>(config.maxRays);
   const uint32_t samples =  // at least one ray fits
       std::max(kCapacityPerDemand * static_cast<uint32_t>(config.samplesPerStep), kMaxTrainingHits);
   hits_ = MeshHits(device, rays, samples);
   const size_t levels = config.levels();
-  counters_ = device.array<uint32_t>((levels + 1) * MeshHits::kCounters + AtlasStage::kCounters);
+  counters_ = device.array<uint32_t>((levels + 1) * MeshHits::kCounters);
   model_.field().reserve(samples);
   for (Array<float>* perRay : {&opacity_, &opaqueOpacity_}) *perRay = device.array<float>(rays);
   for (Array<float>* perRay : {&colour_, &opaqueColour_, &skyColour_}) *perRay = device.array<float>(size_t{rays} * 3);
   losses_ = device.array<float>(levels * kLosses + PhotoLoss::kLosses);
-  coarseLosses_ = device.array<float>(AtlasStage::kLosses);
-  coarseCounters_ = device.array<uint32_t>(AtlasStage::kCounters);
   for (Array<float>* perSample : {&sampleWeights_, &sampleSteps_, &weightGradients_, &logitGradients_})
     *perSample = device.array<float>(samples);
   for (Array<float>* perSample : {&sampleColourGradients_, &positionGradients_})
@@ -105,109 +87,31 @@ bool MeshTrainer::isFinalStage(int64_t step, int64_t plannedSteps) const {
   return plannedSteps > 0 && step >= config_.stepsBeforeFinalStage(plannedSteps);
 }
 
-void MeshTrainer::beginFinalStage() {
-  const bool isNew = !model_.atlas();
-  if (isNew) {
-    if (model_.levels() == 1)  // short trainings end before coarse levels are trained
-      model_.addCoarseLevels(mix64(static_cast<uint64_t>(config_.seed)));
-    ExtractionSettings extraction;
-    if (model_.part().isBackground()) {
-      extraction.raysPerCell = 0;
-    } else {
-      extraction.photoStride = findPhotoStride(pixelWidth_, model_.level(0).domain());
-    }
-    extraction.droppedShare = config_.droppedShare;
-    extraction.dilation = config_.dilation;
-    MeshAtlas atlas;
-    atlas.patchEdge = static_cast<uint32_t>(config_.patchTexels);
-    atlas.faces = extractFaces(model_, 0, capture_, &tiles_, extraction);
-    if (atlas.faces.count() == 0) warn("{}: no triangle is opaque enough to be kept", model_.part().name);
-    atlas.ranges.resize(2 * MeshField::kFeatures);  // they are found below
-    model_.setAtlas(std::move(atlas));
-    updateCoverage("before");
-  }
-  TexelAtlas texels(model_, 0, model_.atlas()->faces, model_.atlas()->patchEdge);
-  if (isNew) model_.setAtlasRanges(texels.findRanges(model_));
-  constexpr uint32_t kTexelsPerHit = 4, kLeastHits = 256;
-  const uint32_t samples = static_cast<uint32_t>(config_.samplesPerStep),
-                 maxRays = static_cast<uint32_t>(config_.maxRays);
-  const uint32_t hits = std::max(kLeastHits, kCapacityPerDemand * samples / kTexelsPerHit);
-  finalStage_.push_back(std::make_unique<AtlasStage>(model_, 0, std::move(texels), maxRays, hits));
-  for (uint32_t level = 1; config_.fitsLevels() && level < model_.levels(); ++level) {
-    if (model_.coarseAtlas(level) == nullptr) fitCoarseLevel(level);
-    TexelAtlas coarse(model_, level, model_.coarseAtlas(level)->faces, model_.atlas()->patchEdge);
-    finalStage_.push_back(std::make_unique<AtlasStage>(model_, level, std::move(coarse), maxRays, hits));
-  }
-}
-
-void MeshTrainer::updateCoverage(const char* when) {
-  if (model_.part().isBackground()) return;
-  const SurfaceCoverage coverage = checkCoverage(model_, capture_, tiles_);
-  inform("{}: {} triangles; {} the final stage, {} of {} pixels that show a surface in it have a hole", coverage.part,
-         model_.atlas()->faces.count(), when, coverage.holes, coverage.pixels);
-  model_.setCoverage(coverage);
-}
-
-void MeshTrainer::fitCoarseLevel(uint32_t level) {
-  constexpr int kRaysAcrossTexels = 2;  // of those that find faces
-  constexpr double kDroppedShare = 0.01;
-  ExtractionSettings extraction;
-  extraction.photoStride = std::max(1, findPhotoStride(pixelWidth_, model_.level(level).domain()) / kRaysAcrossTexels);
-  extraction.raysPerCell *= kRaysAcrossTexels;
-  extraction.droppedShare = kDroppedShare;
-  FittedLevel fitted = fitLevel(model_, level, capture_, &tiles_, extraction);
-  model_.addCoarseAtlas(std::move(fitted.faces), fitted.texels);
-}
-
 // Its rate falls, over the final stage, from kFinalStageRate to the final factor of the rate of all steps.
 StepReport MeshTrainer::finalStep(int64_t step, int64_t plannedSteps) {
-  if (finalStage_.empty()) beginFinalStage();
-  photoRays_.draw(step, budget_.rays(), kSquareOfRays);
-  const Slice<uint32_t> counters = counters_.part(counters_.size() - AtlasStage::kCounters, AtlasStage::kCounters);
-  finalStage_[0]->addGradients(photoRays_, photoRays_.count(), photoLoss_, losses_.part(0, AtlasStage::kLosses),
-                               counters);
+  if (!finalStage_.hasBegun()) finalStage_.begin();
+  photoRays_.draw(step, budget_.rays(), FinalStage::kSquareOfRays);
+  finalStage_.addGradients(photoRays_, photoLoss_);
   const int64_t first = config_.stepsBeforeFinalStage(plannedSteps);
   const double done =
       static_cast<double>(step - first) / static_cast<double>(std::max<int64_t>(1, plannedSteps - first));
   updateNetworks(config_.learningRate * kFinalStageRate *
                  std::pow(config_.finalLearningRateFactor / kFinalStageRate, done));
-  updateCoarseTexels(done);
+  finalStage_.trainCoarserLevels(photoRays_, photoLoss_, done);
 
-  const auto [counts, losses] = device_.readAll(counters, losses_.part(0, AtlasStage::kLosses));
-  StepReport report;
-  report.samples = report.marched = counts[0];
-  report.rays = counts[1];
-  report.texels = counts[2];
-  report.loss = losses[0] + losses[PhotoLoss::kLosses];
-  double weight = 0;
-  for (uint32_t ray = 0; ray < report.rays; ++ray) weight += photoRays_.batch().weights[ray];
-  report.squaredError = losses[1] / std::max(1.0, 3 * weight);
+  const StepReport report = finalStage_.report(photoRays_);
   double target = config_.samplesPerStep * static_cast<double>(report.rays) / std::max(1u, report.texels);
   if (report.rays < photoRays_.count()) target = std::min<double>(target, report.rays);
-  constexpr double kRaysOfSquare = kSquareOfRays * kSquareOfRays;
+  constexpr double kRaysOfSquare = FinalStage::kSquareOfRays * FinalStage::kSquareOfRays;
   budget_.aimFor(std::ceil(target / kRaysOfSquare) * kRaysOfSquare);
-  if (step + 1 == plannedSteps) updateCoverage("after");  // opacities have changed since the stage began
+  if (step + 1 == plannedSteps) finalStage_.updateCoverage("after");  // opacities have changed since it began
   return report;
-}
-
-void MeshTrainer::updateCoarseTexels(double done) {
-  for (uint32_t level = 1; level < finalStage_.size(); ++level) {
-    const uint32_t rays = std::max(1u, photoRays_.count() >> (level - 1));
-    finalStage_[level]->addGradients(photoRays_, rays, photoLoss_, coarseLosses_, coarseCounters_);
-    Adam adam;
-    adam.rate = static_cast<float>(kTexelRate * std::pow(kFinalTexelFactor, done));
-    adam.skipZeroGradients = true;
-    model_.coarseAtlas(level)->texels.step(device_, adam);
-  }
 }
 
 StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
   if (isFinalStage(step, plannedSteps)) return finalStep(step, plannedSteps);
   plannedSteps = config_.stepsBeforeFinalStage(plannedSteps);
-  if (model_.atlas()) {  // the training goes on beyond its former end
-    model_.removeAtlas();
-    finalStage_.clear();
-  }
+  finalStage_.undo();
   refreshOccupancy(step);
   if (!config_.fitsLevels() && MeshSchedule::period(step, plannedSteps) > 0 && model_.levels() == 1)
     model_.addCoarseLevels(mix64(static_cast<uint64_t>(config_.seed)));
@@ -227,7 +131,7 @@ StepReport MeshTrainer::step(int64_t step, int64_t plannedSteps) {
   constexpr uint32_t kColours = PhotoLoss::kLosses;
   report.loss = losses[0] + losses[kColours] + losses[2 * kColours] + losses[2 * kColours + 1];
   if (drawsThrough) {
-    report.samples += countHits(counters[counters.size() - AtlasStage::kCounters - MeshHits::kCounters]);
+    report.samples += countHits(counters[counters.size() - MeshHits::kCounters]);
     report.loss += losses[losses.size() - PhotoLoss::kLosses];
   }
   double weight = 0;
@@ -389,7 +293,7 @@ uint32_t MeshTrainer::addThroughGradients(int64_t step) {
   const uint32_t rays = kOpacitiesPerColour * colours;
   if (rays == 0) return 0;
   throughRays_->draw(step, rays);
-  hits_.counters = counters_.part(counters_.size() - AtlasStage::kCounters - MeshHits::kCounters, MeshHits::kCounters);
+  hits_.counters = counters_.part(counters_.size() - MeshHits::kCounters, MeshHits::kCounters);
   model_.level(0).trace(throughRays_->rays(), kMaxTrainingHits, false, hits_);
   const Count samples = hits_.samples(), finished = hits_.finished(rays);
   model_.field().encodeForBackward(samples, hits_.positions);

@@ -1,7 +1,7 @@
 // One training step of a part of a mesh: rays → hits on octahedra → field → two images → losses → gradients → Adam.
 #pragma once
 
-#include "representations/mesh/train/atlas_stage.h"
+#include "representations/mesh/train/final_stage.h"
 #include "representations/mesh/train/mesh_model.h"
 #include "representations/mesh/train/mesh_start.h"
 #include "representations/mesh/train/through_rays.h"
@@ -31,14 +31,7 @@ class MeshTrainer final : public TrainableModel {
 
  private:
   bool movesVertices(int64_t step) const { return step >= config_.vertexStartSteps && config_.vertexLearningRate > 0; }
-  // The final stage: its atlas is made before its first step.
   bool isFinalStage(int64_t step, int64_t plannedSteps) const;
-  void beginFinalStage();
-  // Counts and reports the pixels of a block that its faces do not cover; `when`, relative to the final stage.
-  void updateCoverage(const char* when);
-  void fitCoarseLevel(uint32_t level);
-  // Trains the texels of coarser levels on the rays of the step. done: share of the final stage.
-  void updateCoarseTexels(double done);
   StepReport finalStep(int64_t step, int64_t plannedSteps);
   void refreshOccupancy(int64_t step);
   // Adds the gradients of a level of detail: of the networks and the vertices for the finest, of the vertices alone for
@@ -73,14 +66,11 @@ class MeshTrainer final : public TrainableModel {
   RayBudget budget_;
   MeshHits hits_;
   Array<uint32_t> counters_;
-  Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, skyColour_, losses_, coarseLosses_;
-  Array<uint32_t> coarseCounters_;
+  Array<float> colour_, opacity_, opaqueColour_, opaqueOpacity_, skyColour_, losses_;
   Array<float> sampleWeights_, sampleSteps_, weightGradients_, logitGradients_, sampleColourGradients_,
       positionGradients_;
-  Array<float> rayOpacityGradients_, zeros_;             // for rays through the block
-  std::vector<TileShares> tiles_;                        // [photo]
-  double pixelWidth_ = 0;                                // MeshStart::pixelWidth
-  std::vector<std::unique_ptr<AtlasStage>> finalStage_;  // of each level
+  Array<float> rayOpacityGradients_, zeros_;  // for rays through the block
+  FinalStage finalStage_;
 };
 
 }  // namespace tessera
