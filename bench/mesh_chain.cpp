@@ -149,7 +149,7 @@ void limitFaces(std::vector<FaceSet>& faces, size_t most) {
 
 // The faces of blocks, with centres in their boxes.
 struct BlockFaces {
-  double all = 0, kept = 0, cells = 0;  // cells: that contain the centre of a kept face
+  double all = 0, extracted = 0, cells = 0;  // cells: that contain the centre of an extracted one
 
   void add(MeshModel& model, const FaceSet& faces) {
     const OctahedraDomain& domain = model.level(0).domain();
@@ -162,7 +162,7 @@ struct BlockFaces {
     all += cellsOfBox * kFacesPerCell / (own.placement == OctahedraPlacement::all ? 1 : 2);
     const TriangleList list = listTriangles(
         domain.grids, domain.ownGrids, model.device().read(model.level(0).displacements().values.all()), faces.bits());
-    kept += static_cast<double>(list.triangles.size());
+    extracted += static_cast<double>(list.triangles.size());
     std::set<uint32_t> places;
     for (const auto& triangle : list.triangles) {
       const Vec3d sum = list.vertices[triangle[0]] + list.vertices[triangle[1]] + list.vertices[triangle[2]];
@@ -206,8 +206,8 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
     mesh.parts[i]->level(0).keepFaces(faces[i].bits());
     if (!mesh.parts[i]->part().isBackground()) blocks.add(*mesh.parts[i], faces[i]);
   }
-  result["kept_share"] = blocks.kept / blocks.all;
-  result["kept_per_cell"] = blocks.kept / blocks.cells;
+  result["kept_share"] = blocks.extracted / blocks.all;
+  result["kept_per_cell"] = blocks.extracted / blocks.cells;
   result["extraction_seconds"] = seconds(extracting);
   evaluateAs("kept_faces", renderer);
 
