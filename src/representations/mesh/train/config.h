@@ -35,10 +35,11 @@ struct MeshConfig : BackgroundBlockSettings,
           "what moves between photos, such as cars: auto (the parts are not trained on pixels that deviate from what "
           "other photos show at the same place) or none (photos are used as they are)",
           anything());
-  SETTING(int, enoughPhotos, 8, "enough_photos",
-          "photos that should show each place: for the places that fewer show, in the median, views between the photos "
-          "are rendered by the coarse field, and the parts are trained on them, too; 0: none",
-          within(0, 64));
+  SETTING(
+      int, enoughPhotos, 8, "enough_photos",
+      "photos that should show each place: if fewer do in the median, the parts are also trained on views between the "
+      "photos, rendered by the coarse field; 0, and without a background block: none",
+      within(0, 64));
   // Model
   SETTING(int, gridFeatures, 2, "grid_features", "features per hash entry", allowedValues({1, 2, 4, 8}));
   SETTING(int, meshCells, 64, "mesh_cells", "cells along an edge of a block's grid of octahedra",

@@ -123,7 +123,8 @@ uint64_t viewSeed(const MeshConfig& config) {
 // Makes what the parts are trained with beside the photos, unless it has been made.
 void compareWithCoarseField(Device& device, const Capture& capture, const fs::path& model, const MeshConfig& config) {
   const bool needsMasks = config.leavesTransientsOut() && !haveTransientMasks(model);
-  const bool needsViews = config.enoughPhotos > 0 && !haveViewsBetween(model);
+  // Without a background block, photos may be transparent, and views by the coarse field are not.
+  const bool needsViews = config.enoughPhotos > 0 && config.hasBackground() && !haveViewsBetween(model);
   if (!needsMasks && !needsViews) return;
   const auto coarse = loadFieldModel(device, coarseFolder(model).root());
   if (needsMasks) makeTransientMasks(capture, *coarse, model);

@@ -74,10 +74,6 @@ Pose placeBetween(const Pose& a, const Pose& b, const RandomStream& random) {
   return pose;
 }
 
-ImageU8 drawView(FieldRenderer& renderer, const Camera& camera, const Pose& pose) {
-  return toBytes(renderer.render(camera, pose, nullptr).colour);
-}
-
 }  // namespace
 
 double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
@@ -164,8 +160,8 @@ void makeViewsBetween(const Capture& capture, FieldModel& coarse, const fs::path
   FieldRenderer renderer(coarse);
   for (size_t view = 0; view < count; ++view) {
     const Photo& photo = placed.photos[capture.photos.size() + view];
-    const ImageU8 image = drawView(renderer, placed.cameras[photo.camera], photo.worldFromCamera);
-    writeFileAtomically(mesh / photo.name, encodePng(image), true);
+    const RenderedView image = renderer.render(placed.cameras[photo.camera], photo.worldFromCamera, nullptr);
+    writeFileAtomically(mesh / photo.name, encodePng(toBytes(image.colour)), true);
   }
   writeFileAtomically(listOfViews(mesh), nlohmann::json({{"views", count}}).dump(2) + "\n", true);
   inform("{:.0f} photos show the same place in the median; {}", photosOfPlace,

@@ -25,9 +25,11 @@ class ViewsBetween : public testing::Test {
  protected:
   // Few photos of the cube.
   ViewsBetween() : device(makeDevice({"cpu", 2})) {}
-  TrainingResult train(const std::string& name, const std::vector<std::string>& only, bool resume) {
+  TrainingResult train(const std::string& name, const std::vector<std::string>& only, bool resume,
+                       const std::string& backgroundBlock = "own") {
     TrainMeshOptions options;
     options.config = smallMeshConfig();
+    options.config.backgroundBlock = backgroundBlock;
     options.config.enoughPhotos = 40;
     options.config.coarseSteps = 120;
     options.blocks = {false, 1, 1};
@@ -86,6 +88,11 @@ TEST_F(ViewsBetween, ShowWhatAPhotoWouldShowThere) {
     }
   }
   EXPECT_LT(squares / static_cast<double>(numbers), 0.04);
+}
+
+TEST_F(ViewsBetween, AreNotMadeWithoutABackgroundBlock) {
+  ASSERT_TRUE(train("mesh", {"coarse"}, false, "none").finished);
+  EXPECT_FALSE(haveViewsBetween(scene / "mesh"));
 }
 
 TEST_F(ViewsBetween, AreTheSameForEveryProcess) {
