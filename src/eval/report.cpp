@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "base/image_io.h"
+#include "base/order_statistics.h"
 #include "eval/heat_map.h"
 #include "eval/html.h"
 #include "eval/psnr.h"
@@ -46,12 +47,8 @@ std::pair<float, float> depthRange(const ImageF& depth) {
     if (std::isfinite(value) && value > 0) known.push_back(value);
   }
   if (known.empty()) return {0.0f, 1.0f};
-  const auto percentile = [&](double share) {
-    const auto at = known.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(known.size() - 1));
-    std::nth_element(known.begin(), at, known.end());
-    return *at;
-  };
-  return {percentile(0.02), percentile(0.98)};
+  const float low = percentile(known, 0.02), high = percentile(known, 0.98);
+  return {low, high};
 }
 
 // Returns the indices of the views, worst PSNR first; those without a PSNR are last.

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/log.h"
+#include "base/order_statistics.h"
 #include "import/georeference.h"
 
 namespace tessera {
@@ -22,9 +23,7 @@ Vec3d medianCentre(const std::vector<Photo>& photos) {
   for (int axis = 0; axis < 3; ++axis) {
     std::vector<double> values;
     for (const Photo& photo : photos) values.push_back(photo.worldFromCamera.translation[axis]);
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    median[axis] = *middle;
+    median[axis] = upperMedian(values);
   }
   return median;
 }

@@ -1,9 +1,8 @@
 #include "partition/cameras.h"
 
 #include <Eigen/Dense>
-#include <algorithm>
 
-#include "base/check.h"
+#include "base/order_statistics.h"
 
 namespace tessera {
 namespace {
@@ -12,13 +11,6 @@ constexpr double kFarOut = 10;
 constexpr double kAlongWeight = 0.001;  // of the distance along an axis, relative to that across it
 
 }  // namespace
-
-double percentile(std::vector<double>& values, double fraction) {
-  CHECK(values.size() > 0u);
-  const auto rank = static_cast<ptrdiff_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<size_t>(rank)];
-}
 
 std::vector<int> photosTogether(const Capture& capture) {
   const std::vector<int> photos = capture.photosIn(Split::train);

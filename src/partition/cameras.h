@@ -7,9 +7,6 @@
 
 namespace tessera {
 
-// Returns the value at rank `fraction`, in [0, 1], of the sorted values. Reorders `values`, which must not be empty.
-double percentile(std::vector<double>& values, double fraction);
-
 // Returns the indices of the training photos without outliers, which have wrong poses: those more than ten times as far
 // from the median position as the 90th percentile.
 std::vector<int> photosTogether(const Capture& capture);

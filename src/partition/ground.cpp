@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "base/order_statistics.h"
 #include "base/random.h"
 #include "partition/cameras.h"
 

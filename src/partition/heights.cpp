@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "partition/cameras.h"
+#include "base/order_statistics.h"
 
 namespace tessera {
 namespace {

@@ -8,6 +8,7 @@
 #include <numbers>
 
 #include "base/check.h"
+#include "base/order_statistics.h"
 #include "partition/cameras.h"
 #include "partition/ray_fan.h"
 #include "partition/rectangle.h"

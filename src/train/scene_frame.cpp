@@ -4,18 +4,13 @@
 #include <algorithm>
 
 #include "base/log.h"
+#include "base/order_statistics.h"
 
 namespace tessera {
 namespace {
 
 constexpr size_t kEnoughPoints = 200;
 constexpr double kFarOut = 10;  // times as far out as nine cameras in ten: taken for a wrong pose
-
-double percentile(std::vector<double>& values, double fraction) {
-  const size_t rank = static_cast<size_t>(fraction * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), values.begin() + static_cast<ptrdiff_t>(rank), values.end());
-  return values[rank];
-}
 
 SceneFrame frameOfPoints(const Capture& capture) {
   Vec3d low, high;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/order_statistics.h"
+
 namespace tessera {
 
 std::vector<std::vector<SparseDepth>> findSparseDepths(const Capture& capture, const SceneFrame& frame,
@@ -41,10 +43,7 @@ SparseDepthMedians::SparseDepthMedians(const Capture& capture, double maxReproje
     }
     photo.medians.resize(distances.size());
     for (size_t part = 0; part < distances.size(); ++part) {
-      if (distances[part].empty()) continue;
-      const auto middle = distances[part].begin() + static_cast<ptrdiff_t>(distances[part].size() / 2);
-      std::nth_element(distances[part].begin(), middle, distances[part].end());
-      photo.medians[part] = *middle;
+      if (!distances[part].empty()) photo.medians[part] = upperMedian(distances[part]);
     }
   }
 }

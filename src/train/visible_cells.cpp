@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/order_statistics.h"
 #include "base/threads.h"
 
 namespace tessera {
@@ -68,9 +69,7 @@ std::vector<double> nearestSparseDepth(const Capture& capture) {
   for (size_t photo = 0; photo < depths.size(); ++photo) {
     std::vector<double>& values = depths[photo];
     if (values.size() < kEnough) continue;
-    const auto rank = values.begin() + static_cast<ptrdiff_t>(kNearestShare * static_cast<double>(values.size()));
-    std::nth_element(values.begin(), rank, values.end());
-    nearest[photo] = *rank;
+    nearest[photo] = valueOfRank(values, static_cast<size_t>(kNearestShare * static_cast<double>(values.size())));
   }
   return nearest;
 }

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "base/order_statistics.h"
 #include "base/random.h"
 #include "compute/composite.h"
 #include "compute/losses.h"
@@ -15,11 +16,6 @@ namespace tessera {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + values.size() / 2, values.end());
-  return values[values.size() / 2];
-}
 
 // A batch of samples as marching produces it, and the memory for one micro-batch of it.
 class Step {
@@ -196,10 +192,10 @@ StepBenchmark benchmarkFieldStep(Device& device, const StepBenchmarkOptions& opt
     if (i == 0) result.firstLoss = result.lastLoss;
   }
   result.steps = static_cast<int>(whole.size());
-  result.medianSeconds = median(whole);
+  result.medianSeconds = upperMedian(whole);
   result.bestSeconds = *std::min_element(whole.begin(), whole.end());
   result.samplesPerSecond = result.samples / result.medianSeconds;
-  for (Part& part : parts) result.phases.push_back({part.name, median(part.seconds)});
+  for (Part& part : parts) result.phases.push_back({part.name, upperMedian(part.seconds)});
   return result;
 }
 

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <limits>
 
-#include "representations/field/train/field_renderer.h"
+#include "base/order_statistics.h"
+#include "representations/mesh/train/coarse_view.h"
 #include "scene/contraction.h"
 
 namespace tessera {
@@ -75,18 +76,16 @@ SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool se
 }
 
 void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose, FieldRenderer& renderer) {
-  constexpr double kSurface = 0.5, kClear = 0.1;  // opacities, at least and at most
-  const int columns = std::max(1, camera.width / kTileEdge), rows = std::max(1, camera.height / kTileEdge);
-  const Camera small = camera.scaledTo(columns, rows);
-  const RenderedView view = renderer.render(small, pose, nullptr);
-  const auto distanceAt = [&](int x, int y) {
-    const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
-    const double opacity = *view.opacity.at(x, y), cosine = inCamera ? inCamera->normalized().z() : 0;
-    return opacity >= kClear && cosine > 0 ? *view.depth.at(x, y) / opacity / cosine : kNever;
+  constexpr float kSurface = 0.5f, kClear = 0.1f;  // opacities, at least and at most
+  const CoarseView view(renderer, strideCamera(camera, kTileEdge), pose);
+  const int columns = view.camera().width, rows = view.camera().height;
+  const auto distanceAt = [&](int x, int y, float opacity) {
+    const auto surface = view.surfaceAt(x, y, opacity);
+    return surface ? (surface->at - pose.translation).norm() : kNever;
   };
   for (int y = 0; y < rows; ++y) {
     for (int x = 0; x < columns; ++x) {
-      const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
+      const auto inCamera = view.camera().directionInCamera({x + 0.5, y + 0.5});
       if (!inCamera) continue;
       Sight sight;
       sight.tile = {photo, static_cast<uint32_t>(camera.width * x / columns),
@@ -95,15 +94,13 @@ void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose,
                     static_cast<uint32_t>(camera.height * (y + 1) / rows)};
       sight.eye = pose.translation;
       sight.towards = (pose.rotation * *inCamera).normalized();
-      sight.isSurface = *view.opacity.at(x, y) >= kSurface && inCamera->z() > 0;
-      if (sight.isSurface) {
-        sight.distance = distanceAt(x, y);
-        sight.pixelWidth = sight.distance / camera.focalX();
-      }
+      sight.distance = distanceAt(x, y, kSurface);
+      sight.isSurface = sight.distance < kNever;
+      sight.pixelWidth = sight.distance / camera.focalX();
       sight.clear = kNever;
       for (int besideY = std::max(0, y - 1); besideY <= std::min(rows - 1, y + 1); ++besideY)
         for (int besideX = std::max(0, x - 1); besideX <= std::min(columns - 1, x + 1); ++besideX)
-          sight.clear = std::min(sight.clear, distanceAt(besideX, besideY));
+          sight.clear = std::min(sight.clear, distanceAt(besideX, besideY, kClear));
       sights_.push_back(sight);
     }
   }
@@ -111,7 +108,6 @@ void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose,
 
 void SurfaceSurvey::addSurface(const Capture& capture, FieldRenderer& renderer) {
   constexpr double kMaxPoints = 1 << 22;
-  constexpr float kSolid = 0.9f;  // less opaque pixels may show several surfaces
   double pixels = 0;
   for (const int photo : capture.photosIn(Split::train)) {
     const Camera& camera = capture.cameras[capture.photos[photo].camera];
@@ -119,19 +115,12 @@ void SurfaceSurvey::addSurface(const Capture& capture, FieldRenderer& renderer) 
   }
   const double stride = std::max<double>(kPhotoStride, std::sqrt(pixels / kMaxPoints));
   for (const int photo : capture.photosIn(Split::train)) {
-    const Pose& pose = capture.photos[photo].worldFromCamera;
     const Camera& camera = capture.cameras[capture.photos[photo].camera];
-    const auto scaled = [&](int length) { return std::max(1, static_cast<int>(length / stride)); };
-    const Camera small = camera.scaledTo(scaled(camera.width), scaled(camera.height));
-    const RenderedView view = renderer.render(small, pose, nullptr);
-    for (int y = 0; y < small.height; ++y) {
-      for (int x = 0; x < small.width; ++x) {
-        const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
-        const float opacity = *view.opacity.at(x, y);
-        if (!inCamera || inCamera->z() <= 0 || opacity < kSolid) continue;
-        const Vec3d at =
-            pose.translation + pose.rotation * (*inCamera / inCamera->z() * (*view.depth.at(x, y) / opacity));
-        surface_.push_back(frame_.sceneFromWorld(at).cast<float>());
+    const CoarseView view(renderer, strideCamera(camera, stride), capture.photos[photo].worldFromCamera);
+    for (int y = 0; y < view.camera().height; ++y) {
+      for (int x = 0; x < view.camera().width; ++x) {
+        if (const auto surface = view.surfaceAt(x, y, kSolidOpacity))
+          surface_.push_back(frame_.sceneFromWorld(surface->at).cast<float>());
       }
     }
   }
@@ -217,11 +206,7 @@ MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& 
     addTile(start.tiles[static_cast<size_t>(sight.tile.photo)], sight.tile);
     if (sight.isSurface) pixelWidths.push_back(sight.pixelWidth * part.frame.scale);
   }
-  if (!pixelWidths.empty()) {
-    const auto middle = pixelWidths.begin() + static_cast<ptrdiff_t>(pixelWidths.size() / 2);
-    std::nth_element(pixelWidths.begin(), middle, pixelWidths.end());
-    start.pixelWidth = *middle;
-  }
+  if (!pixelWidths.empty()) start.pixelWidth = upperMedian(pixelWidths);
   return start;
 }
 

@@ -122,9 +122,9 @@ uint64_t viewSeed(const MeshConfig& config) {
 
 // Makes what the parts are trained with beside the photos, unless it has been made.
 void compareWithCoarseField(Device& device, const Capture& capture, const fs::path& model, const MeshConfig& config) {
-  const bool needsMasks = config.leavesTransientsOut() && !haveTransientMasks(model);
+  const bool needsMasks = config.leavesTransientsOut() && !transientFolder(model).isComplete();
   // Without a background block, photos may be transparent, and views by the coarse field are not.
-  const bool needsViews = config.enoughPhotos > 0 && config.hasBackground() && !haveViewsBetween(model);
+  const bool needsViews = config.enoughPhotos > 0 && config.hasBackground() && !viewsFolder(model).isComplete();
   if (!needsMasks && !needsViews) return;
   const auto coarse = loadFieldModel(device, coarseFolder(model).root());
   if (needsMasks) makeTransientMasks(capture, *coarse, model);
@@ -187,8 +187,8 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     };
     for (const MeshPart& part : parts) removeModel(partFolder(model, part));
     if (!options.loop.resume) removeModel(coarseFolder(model));
-    if (!options.loop.resume) removeTransientMasks(model);
-    if (!options.loop.resume) removeViewsBetween(model);
+    if (!options.loop.resume) transientFolder(model).remove();
+    if (!options.loop.resume) viewsFolder(model).remove();
     if (!options.loop.resume) fs::remove(model / "run.json");
     keepLength(model, options.loop);
     writeFileAtomically(run.folder.configPath(), reproductionHeader(device, options.loop, " --grid blocks.json") +

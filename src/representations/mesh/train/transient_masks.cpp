@@ -7,10 +7,10 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "base/error.h"
 #include "base/image_io.h"
 #include "base/log.h"
-#include "representations/field/train/field_renderer.h"
+#include "base/order_statistics.h"
+#include "representations/mesh/train/coarse_view.h"
 #include "train/photo_visibility.h"
 
 namespace tessera {
@@ -21,13 +21,6 @@ using nlohmann::json;
 constexpr double kPixelsOfPhoto = 1 << 15, kPixelsOfAll = 1 << 24;  // that are compared, at most
 constexpr double kLeastStride = 2;                                  // pixels
 constexpr double kVoxelPixels = 2;                                  // edge of a voxel in pixels that are compared
-
-fs::path transientFolder(const fs::path& mesh) {
-  return mesh / "transient";
-}
-fs::path listOfMasks(const fs::path& mesh) {
-  return transientFolder(mesh) / "masks.json";
-}
 
 // Returns the distance between the pixels of a photo that are compared.
 double findStride(const Camera& camera, size_t photos) {
@@ -49,28 +42,24 @@ ImageF readPhotoOverBlack(const Photo& photo, const Camera& small) {
 }
 
 // Compares one photo, and appends the widths of its pixels on the surfaces.
-ComparedPhoto comparePhoto(const Photo& photo, const Camera& camera, const Camera& small, FieldRenderer& renderer,
+ComparedPhoto comparePhoto(const Photo& photo, const Camera& camera, double stride, FieldRenderer& renderer,
                            const SceneFrame& frame, std::vector<float>& pixelWidths) {
-  constexpr float kSolid = 0.9f;  // less opaque pixels may show several surfaces
-  const RenderedView view = renderer.render(small, photo.worldFromCamera, nullptr);
+  const CoarseView view(renderer, strideCamera(camera, stride), photo.worldFromCamera);
+  const Camera& small = view.camera();
   ImageU8 mask = readPhotoMask(photo, camera);
   if (!mask.empty()) mask = downscaleByArea(mask, small.width, small.height);
   ComparedPhoto compared;
   compared.points = ImageF(small.width, small.height, 3, std::numeric_limits<float>::quiet_NaN());
   for (int y = 0; y < small.height; ++y) {
     for (int x = 0; x < small.width; ++x) {
-      const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
-      const float opacity = *view.opacity.at(x, y);
-      if (!inCamera || inCamera->z() <= 0 || opacity < kSolid) continue;
-      if (!mask.empty() && *mask.at(x, y) < 255) continue;
-      const double depth = *view.depth.at(x, y) / opacity;
-      const Vec3d at = frame.sceneFromWorld(photo.worldFromCamera.translation +
-                                            photo.worldFromCamera.rotation * (*inCamera / inCamera->z() * depth));
+      const auto surface = view.surfaceAt(x, y, kSolidOpacity);
+      if (!surface || (!mask.empty() && *mask.at(x, y) < 255)) continue;
+      const Vec3d at = frame.sceneFromWorld(surface->at);
       for (int axis = 0; axis < 3; ++axis) compared.points.at(x, y)[axis] = static_cast<float>(at[axis]);
-      pixelWidths.push_back(static_cast<float>(depth / small.focalX() * frame.scale));
+      pixelWidths.push_back(static_cast<float>(surface->depth / small.focalX() * frame.scale));
     }
   }
-  compared.difference = subtractField(readPhotoOverBlack(photo, small), view.colour, compared.points);
+  compared.difference = subtractField(readPhotoOverBlack(photo, small), view.image().colour, compared.points);
   return compared;
 }
 
@@ -102,6 +91,10 @@ CombinedMask combineMasks(const Photo& photo, const Camera& camera, const ImageU
 
 }  // namespace
 
+ListedFolder transientFolder(const fs::path& mesh) {
+  return ListedFolder(mesh / "transient", "masks");
+}
+
 ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse) {
   ComparedPhotos compared;
   FieldRenderer renderer(coarse);
@@ -110,15 +103,10 @@ ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse) {
   for (const int number : photos) {
     const Photo& photo = capture.photos[number];
     const Camera& camera = capture.cameras[photo.camera];
-    const double stride = findStride(camera, photos.size());
-    const auto scaled = [&](int length) { return std::max(1, static_cast<int>(length / stride)); };
-    compared.photos.push_back(comparePhoto(photo, camera, camera.scaledTo(scaled(camera.width), scaled(camera.height)),
-                                           renderer, coarse.frame(), pixelWidths));
+    compared.photos.push_back(
+        comparePhoto(photo, camera, findStride(camera, photos.size()), renderer, coarse.frame(), pixelWidths));
   }
-  if (pixelWidths.empty()) return compared;
-  const auto middle = pixelWidths.begin() + static_cast<ptrdiff_t>(pixelWidths.size() / 2);
-  std::nth_element(pixelWidths.begin(), middle, pixelWidths.end());
-  compared.pixelWidth = *middle;
+  if (!pixelWidths.empty()) compared.pixelWidth = upperMedian(pixelWidths);
   return compared;
 }
 
@@ -130,6 +118,7 @@ TransientSettings chooseTransientSettings(const ComparedPhotos& compared) {
 
 void writeTransientMasks(const Capture& capture, const std::vector<ImageU8>& transients, const fs::path& mesh) {
   const std::vector<int> photos = capture.photosIn(Split::train);
+  const ListedFolder folder = transientFolder(mesh);
   json files = json::object();
   size_t shown = 0, excluded = 0;
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -139,10 +128,10 @@ void writeTransientMasks(const Capture& capture, const std::vector<ImageU8>& tra
     excluded += combined.excluded;
     if (combined.excluded == 0) continue;
     const std::string file = fmt::format("{}.png", photos[i]);
-    writeFileAtomically(transientFolder(mesh) / file, encodePng(combined.mask), true);
+    folder.writeFile(file, encodePng(combined.mask));
     files[photo.name] = file;
   }
-  writeFileAtomically(listOfMasks(mesh), json({{"masks", files}}).dump(2) + "\n", true);
+  folder.writeList(files);
   inform("transient: {:.2f} % of the photos' pixels, in {} of {} photos, show what moves, and are left out",
          100.0 * static_cast<double>(excluded) / static_cast<double>(std::max<size_t>(1, shown)), files.size(),
          photos.size());
@@ -154,31 +143,19 @@ void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::pa
   writeTransientMasks(capture, findTransientPixels(std::move(compared.photos), settings), mesh);
 }
 
-bool haveTransientMasks(const fs::path& mesh) {
-  return fs::exists(listOfMasks(mesh));
-}
-
-void removeTransientMasks(const fs::path& mesh) {
-  if (!haveTransientMasks(mesh)) return;
-  fs::remove(listOfMasks(mesh));  // first, so that no list of missing masks remains
-  fs::remove_all(transientFolder(mesh));
-}
-
 Capture applyTransientMasks(Capture capture, const fs::path& mesh) {
-  if (!haveTransientMasks(mesh)) return capture;
-  const fs::path path = listOfMasks(mesh);
-  const json list = json::parse(readTextFile(path), nullptr, false);
+  const ListedFolder folder = transientFolder(mesh);
+  if (!folder.isComplete()) return capture;
+  const json masks = folder.readList();
   const auto require = [&](bool isValid, const std::string& what) {
-    constexpr const char* kRemedy = "remove the file, and resume the training";
-    if (!isValid) throw Error(path.string(), "masks", what, kRemedy);
+    if (!isValid) throw folder.malformed(what);
   };
-  require(list.is_object() && list.contains("masks") && list["masks"].is_object(), "is not an object");
-  const json& masks = list["masks"];
+  require(masks.is_object(), "is not an object");
   for (Photo& photo : capture.photos) {
     if (!masks.contains(photo.name)) continue;
     const json& file = masks[photo.name];
     require(file.is_string(), "does not name the mask of '" + photo.name + "'");
-    const auto mask = resolveInside(transientFolder(mesh), file.get<std::string>());
+    const auto mask = resolveInside(folder.path(), file.get<std::string>());
     require(mask && fs::exists(*mask), "names a mask of '" + photo.name + "' that is not there");
     photo.mask = *mask;
   }

@@ -2,8 +2,8 @@
 // from the coarse field, and the same for all parts and processes.
 #pragma once
 
-#include "base/file.h"
 #include "representations/field/train/field_model.h"
+#include "representations/mesh/train/listed_folder.h"
 #include "representations/mesh/train/transient_pixels.h"
 #include "scene/capture.h"
 
@@ -27,9 +27,8 @@ TransientSettings chooseTransientSettings(const ComparedPhotos& compared);
 void writeTransientMasks(const Capture& capture, const std::vector<ImageU8>& transients, const fs::path& mesh);
 // Finds what is transient, and writes the masks. Throws Error as comparePhotos and writeTransientMasks do.
 void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh);
-// Whether all masks have been written.
-bool haveTransientMasks(const fs::path& mesh);
-void removeTransientMasks(const fs::path& mesh);
+// The folder of these masks.
+ListedFolder transientFolder(const fs::path& mesh);
 
 // Returns the capture with these masks in place of the photos' own; unchanged if there are none. Throws Error if their
 // list is malformed.

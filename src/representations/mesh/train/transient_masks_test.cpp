@@ -89,8 +89,8 @@ TEST_F(TransientMasks, ExcludeWhatThePhotosOwnMasksExclude) {
   }
   EXPECT_EQ(photoAt(masked, photos[1]).mask, ownFile) << "shows nothing transient";
   EXPECT_TRUE(photoAt(masked, photos[3]).mask.empty());
-  removeTransientMasks(scene / "mesh");
-  EXPECT_FALSE(haveTransientMasks(scene / "mesh"));
+  transientFolder(scene / "mesh").remove();
+  EXPECT_FALSE(transientFolder(scene / "mesh").isComplete());
   EXPECT_EQ(applyTransientMasks(stained, scene / "mesh").photos[0].mask, stained.photos[0].mask);
 }
 

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "base/check.h"
+#include "base/order_statistics.h"
 #include "base/random.h"
 
 namespace tessera {
@@ -16,12 +17,6 @@ namespace {
 
 constexpr size_t kChannels = 3;
 using Colour = std::array<float, kChannels>;
-
-float findMedian(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 float meanMagnitude(const Colour& colour) {
   float sum = 0;
@@ -106,13 +101,13 @@ void PhotoComparison::compareVoxel(std::span<const PlacedPixel> pixels) {
   std::vector<float> values(means.size());
   for (size_t k = 0; k < kChannels; ++k) {
     std::transform(means.begin(), means.end(), values.begin(), [&](const Colour& mean) { return mean[k]; });
-    median[k] = findMedian(values);
+    median[k] = upperMedian(values);
   }
   std::transform(means.begin(), means.end(), values.begin(), [&](Colour deviation) {
     for (size_t k = 0; k < kChannels; ++k) deviation[k] -= median[k];
     return meanMagnitude(deviation);
   });
-  const float limit = std::max(settings_.leastDeviation, settings_.spreads * findMedian(values));
+  const float limit = std::max(settings_.leastDeviation, settings_.spreads * upperMedian(values));
   for (const PlacedPixel& at : pixels) {
     limits_[at.photo].pixels[at.pixel] = limit;
     for (size_t k = 0; k < kChannels; ++k) difference(at)[k] -= median[k];
@@ -187,7 +182,7 @@ ImageF subtractField(const ImageF& photo, const ImageF& field, const ImageF& poi
     for (size_t i = channel; i < field.pixels.size(); i += kChannels)
       if (!std::isnan(points.pixels[i]) && field.pixels[i] > kDark)
         quotients.push_back(photo.pixels[i] / field.pixels[i]);
-    const float gain = quotients.empty() ? 1 : std::max(kDark, findMedian(quotients));
+    const float gain = quotients.empty() ? 1 : std::max(kDark, upperMedian(quotients));
     for (size_t i = channel; i < field.pixels.size(); i += kChannels)
       difference.pixels[i] = photo.pixels[i] / gain - field.pixels[i];
   }

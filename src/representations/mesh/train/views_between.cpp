@@ -9,11 +9,11 @@
 #include <set>
 #include <unordered_map>
 
-#include "base/error.h"
 #include "base/image_io.h"
 #include "base/log.h"
+#include "base/order_statistics.h"
 #include "base/random.h"
-#include "representations/field/train/field_renderer.h"
+#include "representations/mesh/train/coarse_view.h"
 #include "representations/mesh/train/mesh_start.h"
 
 namespace tessera {
@@ -26,14 +26,8 @@ constexpr double kSimilarDirection = 0.7;    // cosine between optical axes
 constexpr double kBeyond = 0.5, kAside = 1;  // range of places, in distances between the photo and its neighbour
 constexpr uint64_t kStream = 0x76696577;
 
-fs::path viewsFolder(const fs::path& mesh) {
-  return mesh / "views";
-}
-fs::path listOfViews(const fs::path& mesh) {
-  return viewsFolder(mesh) / "views.json";
-}
-std::string viewName(size_t view) {
-  return fmt::format("views/{:04}.png", view);
+std::string viewFile(size_t view) {
+  return fmt::format("{:04}.png", view);
 }
 
 Camera smallerCamera(const Camera& camera) {
@@ -76,6 +70,10 @@ Pose placeBetween(const Pose& a, const Pose& b, const RandomStream& random) {
 
 }  // namespace
 
+ListedFolder viewsFolder(const fs::path& mesh) {
+  return ListedFolder(mesh / "views", "views");
+}
+
 double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
   constexpr float kSurface = 0.5f;  // opacity
   constexpr double kTilesAcrossPlace = 2;
@@ -89,24 +87,18 @@ double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
   for (const int number : capture.photosIn(Split::train)) {
     const Photo& photo = capture.photos[number];
     const Camera& camera = capture.cameras[photo.camera];
-    const Camera small = camera.scaledTo(std::max(1, camera.width / kTileEdge), std::max(1, camera.height / kTileEdge));
-    const RenderedView view = renderer.render(small, photo.worldFromCamera, nullptr);
-    for (int y = 0; y < small.height; ++y) {
-      for (int x = 0; x < small.width; ++x) {
-        const auto inCamera = small.directionInCamera({x + 0.5, y + 0.5});
-        const float opacity = *view.opacity.at(x, y);
-        if (!inCamera || inCamera->z() <= 0 || opacity < kSurface) continue;
-        const double depth = *view.depth.at(x, y) / opacity;
-        const Vec3d at = photo.worldFromCamera * (*inCamera / inCamera->z() * depth);
-        sights.push_back({number, coarse.frame().sceneFromWorld(at)});
-        widths.push_back(depth / small.focalX() * coarse.frame().scale);
+    const CoarseView view(renderer, strideCamera(camera, kTileEdge), photo.worldFromCamera);
+    for (int y = 0; y < view.camera().height; ++y) {
+      for (int x = 0; x < view.camera().width; ++x) {
+        const auto surface = view.surfaceAt(x, y, kSurface);
+        if (!surface) continue;
+        sights.push_back({number, coarse.frame().sceneFromWorld(surface->at)});
+        widths.push_back(surface->depth / view.camera().focalX() * coarse.frame().scale);
       }
     }
   }
   if (sights.empty()) return 0;
-  const auto middle = widths.begin() + static_cast<ptrdiff_t>(widths.size() / 2);
-  std::nth_element(widths.begin(), middle, widths.end());
-  const double place = kTilesAcrossPlace * *middle;
+  const double place = kTilesAcrossPlace * upperMedian(widths);
   const auto key = [&](const Vec3d& at) {
     uint64_t hash = 0;
     for (int axis = 0; axis < 3; ++axis) hash = mix64(hash ^ static_cast<uint64_t>(std::llround(at[axis] / place)));
@@ -116,9 +108,7 @@ double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
   for (const Sight& sight : sights) photosOfPlace[key(sight.at)].insert(sight.photo);
   std::vector<size_t> counts;
   for (const Sight& sight : sights) counts.push_back(photosOfPlace.at(key(sight.at)).size());
-  const auto median = counts.begin() + static_cast<ptrdiff_t>(counts.size() / 2);
-  std::nth_element(counts.begin(), median, counts.end());
-  return static_cast<double>(*median);
+  return static_cast<double>(upperMedian(counts));
 }
 
 size_t countMissingViews(size_t photos, double photosOfPlace, int enough) {
@@ -137,7 +127,7 @@ Capture placeViewsBetween(Capture capture, size_t count, uint64_t seed) {
     auto [neighbours, isNew] = neighboursOfPhoto.try_emplace(number);
     if (isNew) neighbours->second = findNeighbours(capture, photos, number);
     Photo added;
-    added.name = viewName(view);
+    added.name = "views/" + viewFile(view);
     added.worldFromCamera = capture.photos[number].worldFromCamera;
     if (!neighbours->second.empty()) {
       const int other = neighbours->second[random.below(3, static_cast<uint32_t>(neighbours->second.size()))];
@@ -157,42 +147,30 @@ void makeViewsBetween(const Capture& capture, FieldModel& coarse, const fs::path
   const size_t photos = capture.photosIn(Split::train).size();
   const size_t count = countMissingViews(photos, photosOfPlace, enough);
   const Capture placed = placeViewsBetween(capture, count, seed);
+  const ListedFolder folder = viewsFolder(mesh);
   FieldRenderer renderer(coarse);
   for (size_t view = 0; view < count; ++view) {
     const Photo& photo = placed.photos[capture.photos.size() + view];
     const RenderedView image = renderer.render(placed.cameras[photo.camera], photo.worldFromCamera, nullptr);
-    writeFileAtomically(mesh / photo.name, encodePng(toBytes(image.colour)), true);
+    folder.writeFile(viewFile(view), encodePng(toBytes(image.colour)));
   }
-  writeFileAtomically(listOfViews(mesh), nlohmann::json({{"views", count}}).dump(2) + "\n", true);
+  folder.writeList(count);
   inform("{:.0f} photos show the same place in the median; {}", photosOfPlace,
          count > 0 ? fmt::format("{} views between them are added", count) : "no views between them are needed");
 }
 
-bool haveViewsBetween(const fs::path& mesh) {
-  return fs::exists(listOfViews(mesh));
-}
-
-void removeViewsBetween(const fs::path& mesh) {
-  if (!haveViewsBetween(mesh)) return;
-  fs::remove(listOfViews(mesh));  // first, so that no list of missing views remains
-  fs::remove_all(viewsFolder(mesh));
-}
-
 Capture addViewsBetween(Capture capture, const fs::path& mesh, uint64_t seed) {
-  if (!haveViewsBetween(mesh)) return capture;
-  const fs::path path = listOfViews(mesh);
-  const nlohmann::json list = nlohmann::json::parse(readTextFile(path), nullptr, false);
+  const ListedFolder folder = viewsFolder(mesh);
+  if (!folder.isComplete()) return capture;
+  const nlohmann::json count = folder.readList();
   const size_t photos = capture.photos.size(), most = kMaxViewsPerPhoto * capture.photosIn(Split::train).size();
-  constexpr const char* kRemedy = "remove the file, and resume the training";
-  if (!list.is_object() || !list.contains("views") || !list["views"].is_number_unsigned() ||
-      list["views"].get<uint64_t>() > most) {
-    throw Error(path.string(), "views", fmt::format("is not a number up to {}", most), kRemedy);
-  }
-  capture = placeViewsBetween(std::move(capture), list["views"].get<size_t>(), seed);
+  if (!count.is_number_unsigned() || count.get<uint64_t>() > most)
+    throw folder.malformed(fmt::format("is not a number up to {}", most));
+  capture = placeViewsBetween(std::move(capture), count.get<size_t>(), seed);
   for (size_t view = photos; view < capture.photos.size(); ++view) {
     Photo& photo = capture.photos[view];
-    photo.image = mesh / photo.name;
-    if (!fs::exists(photo.image)) throw Error(path.string(), "views", "'" + photo.name + "' is missing", kRemedy);
+    photo.image = folder.file(viewFile(view - photos));
+    if (!fs::exists(photo.image)) throw folder.malformed("'" + photo.image.filename().string() + "' is missing");
   }
   return capture;
 }

@@ -3,8 +3,8 @@
 // than the parts and knows unseen directions better. The paper, which has many photos of each place, has no such views.
 #pragma once
 
-#include "base/file.h"
 #include "representations/field/train/field_model.h"
+#include "representations/mesh/train/listed_folder.h"
 #include "scene/capture.h"
 
 namespace tessera {
@@ -26,9 +26,8 @@ Capture placeViewsBetween(Capture capture, size_t count, uint64_t seed);
 // Renders the views of placeViewsBetween into the folder `views` of the model of a mesh, as many as are missing for
 // `enough` photos. Other processes may write the same views at the same time. Throws Error if a file cannot be written.
 void makeViewsBetween(const Capture& capture, FieldModel& coarse, const fs::path& mesh, int enough, uint64_t seed);
-// Whether all views have been written; there may be none.
-bool haveViewsBetween(const fs::path& mesh);
-void removeViewsBetween(const fs::path& mesh);
+// The folder of these views; there may be none.
+ListedFolder viewsFolder(const fs::path& mesh);
 
 // Returns the capture with these views; unchanged if there are none. Throws Error if their list is malformed.
 Capture addViewsBetween(Capture capture, const fs::path& mesh, uint64_t seed);

@@ -92,7 +92,7 @@ TEST_F(ViewsBetween, ShowWhatAPhotoWouldShowThere) {
 
 TEST_F(ViewsBetween, AreNotMadeWithoutABackgroundBlock) {
   ASSERT_TRUE(train("mesh", {"coarse"}, false, "none").finished);
-  EXPECT_FALSE(haveViewsBetween(scene / "mesh"));
+  EXPECT_FALSE(viewsFolder(scene / "mesh").isComplete());
 }
 
 TEST_F(ViewsBetween, AreTheSameForEveryProcess) {

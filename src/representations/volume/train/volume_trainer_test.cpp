@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/order_statistics.h"
 #include "representations/volume/testing/volume_cube.h"
 #include "representations/volume/train/train_volume.h"
 #include "representations/volume/train/volume_model_renderer.h"
@@ -68,8 +69,7 @@ double depthError(const CubeScene& scene, VolumeModel& model) {
     for (size_t i = 0; i < truth.depth.pixels.size(); ++i)
       errors.push_back(std::abs(seen.depth.pixels[i] - truth.depth.pixels[i]));
   }
-  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
-  return errors[errors.size() / 2];
+  return upperMedian(errors);
 }
 
 TEST(VolumeTrainer, LearnsSurfacePositionsFromSparsePoints) {
