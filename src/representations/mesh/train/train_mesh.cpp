@@ -21,9 +21,15 @@ namespace {
 
 constexpr double kTexelsPerCell = 8;  // of a block's finest triangles, along an edge
 constexpr double kLeastMinutes = 0.05;
-// The training loop derives the number of a block's steps from their speed before the coarse levels begin, and they
-// take this many times as long in the end (measured once, on a synthetic city).
-constexpr double kSlowing = 1.27;
+
+// Returns the minutes from which the training loop derives the number of a block's steps, so that it takes `minutes` in
+// the end, coarser levels included. The loop measures the speed early in training, when there are none.
+double minutesOfSteps(const MeshConfig& config, double minutes) {
+  constexpr double kFitting = 0.4, kLeastShare = 0.8;  // of coarser levels, on two cores
+  constexpr double kSlowing = 1.27;                    // by the training of coarser levels, in the end
+  if (config.meshLevels == 1) return minutes;
+  return config.fitsLevels() ? std::max(kLeastShare * minutes, minutes - kFitting) : minutes / kSlowing;
+}
 
 class Stopwatch {
  public:
@@ -239,7 +245,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
                               ? (1 - config.coarseShare) * shareLeft * options.loop.minutes
                               : options.loop.minutes - stopwatch.minutes();
       loop.minutes = std::max(kLeastMinutes, left * plan.share / shareLeft);
-      if (!plan.part.isBackground()) loop.minutes /= kSlowing;
+      if (!plan.part.isBackground()) loop.minutes = minutesOfSteps(config, loop.minutes);
     } else if (plan.part.isBackground()) {
       const int64_t steps = loop.steps > 0 ? loop.steps : kDefaultSteps;
       loop.steps = std::max<int64_t>(1, std::llround(static_cast<double>(steps) * config.backgroundShare));
