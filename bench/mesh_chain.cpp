@@ -147,7 +147,7 @@ void limitFaces(std::vector<FaceSet>& faces, size_t most) {
   faces = reduced(high);
 }
 
-// The faces of blocks, with centres in their boxes.
+// The faces of blocks in their contents, relative to those of the cells in their boxes.
 struct BlockFaces {
   double all = 0, extracted = 0, cells = 0;  // cells: that contain the centre of an extracted one
 

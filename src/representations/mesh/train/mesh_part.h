@@ -30,7 +30,7 @@ std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool background);
 // share; an occupancy refers to the cells of this lattice.
 struct OctahedraDomain {
   std::vector<OctahedraGrid> grids;  // for training
-  // For rendering: limited to the block, so that no place is in two blocks. Outside, the grids do not overlap.
+  // For rendering the model: limited to the block, so that no place is in two blocks. Outside, the grids do not overlap.
   std::vector<OctahedraGrid> ownGrids;
   std::array<float, 3> boxInFront{};  // TraceOctahedra::boxInFront
 

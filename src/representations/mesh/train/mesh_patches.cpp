@@ -45,10 +45,11 @@ TriangleList listTriangles(OctahedraGrids grids, OctahedraGrids owners, const st
           inGrid[corner][axis] =
               place[axis] + corners[corner][axis] + 0.5 + displacements[size_t{3} * cellOfVertex[corner] + axis];
       }
-      const Vec3d centre = (inGrid[0] + inGrid[1] + inGrid[2]) / 3;
       bool isOwn = true;
-      for (int axis = 0; axis < 3; ++axis)
-        isOwn = isOwn && centre[axis] >= owners[g].lowest[axis] && centre[axis] < owners[g].highest[axis];
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto [low, high] = std::minmax({inGrid[0][axis], inGrid[1][axis], inGrid[2][axis]});
+        isOwn = isOwn && high > owners[g].lowest[axis] && low < owners[g].highest[axis];
+      }
       if (!isOwn) continue;
       std::array<uint32_t, 3> triangle{};
       for (int corner = 0; corner < 3; ++corner) {

@@ -19,9 +19,10 @@ struct TriangleList {
   std::vector<uint32_t> faceOfTriangle;  // numbers of faces (compute/octahedra.h)
 };
 
-// Returns those of the given faces (bits of face numbers, TraceOctahedra::keptFaces) that exist and whose centre lies
-// in the box of the grid of the same number in `owners`, so that neighbouring parts do not repeat each other's
-// triangles. displacements: [grids][cells][3].
+// Returns those of the given faces (bits of face numbers, TraceOctahedra::keptFaces) that exist and whose bounds reach
+// into the box of the grid of the same number in `owners`. Those of neighbouring parts overlap at their common wall by
+// up to a triangle, so that there is no gap between their surfaces, which do not match exactly. displacements:
+// [grids][cells][3].
 TriangleList listTriangles(OctahedraGrids grids, OctahedraGrids owners, const std::vector<float>& displacements,
                            const std::vector<uint32_t>& faceBits);
 

@@ -78,26 +78,34 @@ TEST(MeshPatches, HaveTexelsOnTheirTriangles) {
   EXPECT_EQ(texelPosition(corners, false, 4, 4, kEdge), Vec3d(1, 1, 0)) << "the first triangle's plane goes on";
 }
 
-TEST(MeshPatches, AreOfTheGridThatOwnsTheCentre) {
+TEST(MeshPatches, AreOfEveryGridThatTheyReachInto) {
   OctahedraGrid grid{8, OctahedraPlacement::all};
   grid.gridFromScene = {4, 0, 0, 4, 0, 4, 0, 4, 0, 0, 4, 4, 0, 0, 0, 1};
   OctahedraGrid left = grid, right = grid;
   left.highest[0] = right.lowest[0] = 3.7f;
   const std::vector<float> displacements(size_t{3} * grid.cells(), 0.1f);
   std::vector<uint32_t> bits(faceWords({&grid, 1}));
-  size_t faces = 0;
+  size_t faces = 0, across = 0;  // faces that cross the wall between both
   for (uint32_t cell = 0; cell < grid.cells(); ++cell) {
     const uint32_t place[3] = {cell % 8, cell / 8 % 8, cell / 64};
     if (std::min({place[0], place[1], place[2]}) == 0 || std::max({place[0], place[1], place[2]}) == 7) continue;
-    for (uint32_t local = 0; local < kFacesPerCell; ++local, ++faces)
+    for (uint32_t local = 0; local < kFacesPerCell; ++local, ++faces) {
       bits[(cell * kFacesPerCell + local) / 32] |= 1u << (cell * kFacesPerCell + local) % 32;
+      const auto corners = octahedronFace(local);
+      const auto [low, high] = std::minmax({corners[0][0], corners[1][0], corners[2][0]});
+      across += static_cast<int>(place[0]) + low <= 3 && static_cast<int>(place[0]) + high >= 4;
+    }
   }
   const auto count = [&](const OctahedraGrid& owner) {
     return listTriangles({&grid, 1}, {&owner, 1}, displacements, bits).triangles.size();
   };
   EXPECT_EQ(count(grid), faces);
   EXPECT_GT(count(left), faces / 4);
-  EXPECT_EQ(count(left) + count(right), faces);
+  EXPECT_GT(across, 0u);
+  EXPECT_EQ(count(left) + count(right), faces + across);
+  OctahedraGrid beside = grid;
+  beside.lowest[0] = 7.61f;
+  EXPECT_EQ(count(beside), 0u) << "no vertex is there";
   const TriangleList all = listTriangles({&grid, 1}, {&grid, 1}, displacements, bits);
   EXPECT_EQ(all.vertices.size(), 8u * 8 * 8 - 8 - 12 * 6) << "shared by all triangles; corners and edges have none";
   for (const Vec3d& vertex : all.vertices) EXPECT_LT(vertex.cwiseAbs().maxCoeff(), 1);
