@@ -47,10 +47,7 @@ class BinarisingDrawer final : public ChangedMeshDrawer {
   }
 };
 
-constexpr int kSky = kSurfaceClasses, kClasses = kSurfaceClasses + 1;
-// In the order of SurfaceClass.
-constexpr std::array<const char*, kClasses> kClassNames = {"ground", "facades", "roofs", "trees",
-                                                           "water",  "wires",   "cars",  "sky"};
+constexpr int kClasses = kSurfaceClasses + 1;
 
 // Returns the class of each pixel.
 std::vector<int> classify(const CityScene& city, const Camera& camera, const Pose& pose, ThreadPool& pool) {

@@ -2,6 +2,7 @@
 // records.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 
@@ -11,6 +12,11 @@
 #include "synth/city_scene.h"
 
 namespace tessera {
+
+// The names of the classes, in the order of SurfaceClass, and of what is no surface.
+inline constexpr int kSky = kSurfaceClasses;
+inline constexpr std::array<const char*, kSurfaceClasses + 1> kClassNames = {"ground", "facades", "roofs", "trees",
+                                                                             "water",  "wires",   "cars",  "sky"};
 
 // Throws Error if the folder holds no capture of a synthetic city.
 std::unique_ptr<CityScene> rebuildCity(const fs::path& capture, ThreadPool& pool);
