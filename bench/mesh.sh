@@ -457,7 +457,7 @@ holes() {
   scene city-mesh city
   [ -e "$work/fresh/transforms.json" ] ||
     "$tessera" synth city "$work/fresh" --blocks 2x2 --photos 200 --altitudes 40,90 --size 200x150 --samples 1
-  for error in 1.5 12; do
+  for error in 1.5 12 24 48; do
     "$program" "$work/city-mesh.scene" "$work/fresh" "$error" "$work/city" > "$work/holes-$error.json"
     jq -c . "$work/holes-$error.json"
     verdict "city 2x2, levels $(jq -c .levels "$work/holes-$error.json"): share of pixels with a hole" \

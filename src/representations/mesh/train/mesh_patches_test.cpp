@@ -2,10 +2,13 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <set>
 
+#include "base/random.h"
 #include "representations/mesh/content/patch_texels.h"
 #include "representations/mesh/train/face_set.h"
+#include "representations/mesh/train/mesh_part.h"
 
 namespace tessera {
 namespace {
@@ -109,6 +112,44 @@ TEST(MeshPatches, AreOfEveryGridThatTheyReachInto) {
   const TriangleList all = listTriangles({&grid, 1}, {&grid, 1}, displacements, bits);
   EXPECT_EQ(all.vertices.size(), 8u * 8 * 8 - 8 - 12 * 6) << "shared by all triangles; corners and edges have none";
   for (const Vec3d& vertex : all.vertices) EXPECT_LT(vertex.cwiseAbs().maxCoeff(), 1);
+}
+
+// Returns whether a point is in a triangle, seen from above.
+bool covers(const std::array<Vec3d, 3>& triangle, const Vec2d& point) {
+  std::array<bool, 3> isLeft{};
+  for (size_t i = 0; i < 3; ++i) {
+    const Vec2d from = triangle[i].head<2>(), along = triangle[(i + 1) % 3].head<2>() - from, to = point - from;
+    isLeft[i] = along.x() * to.y() - along.y() * to.x() >= 0;
+  }
+  return isLeft[0] == isLeft[1] && isLeft[1] == isLeft[2];
+}
+
+// The ground of two blocks: the inner faces of one layer of octahedra, whose vertices each block has moved on its own.
+TEST(MeshPatches, LeaveNoGapAtTheWallBetweenBlocks) {
+  constexpr uint32_t kCells = 16, kLayer = 8, kFirst = kOuterFaces, kLast = kOuterFaces + 3;  // in x and y
+  std::vector<std::array<Vec3d, 3>> triangles;                                                // in the world
+  for (const double side : {-1.0, 1.0}) {
+    MeshPart block{"block", 0, {}, {1, 1, 1}};
+    block.frame.centre = {side, 0, 0};
+    const OctahedraDomain domain = makeOctahedraDomain(block, kCells, OctahedraPlacement::checkerboard);
+    const RandomStream random(7, side > 0 ? 1 : 0);
+    std::vector<float> displacements(size_t{3} * kCells * kCells * kCells);
+    for (size_t i = 0; i < displacements.size(); ++i) displacements[i] = 0.6f * (random.uniform(i) - 0.5f);
+    FaceSet faces(domain.grids);
+    for (uint32_t cell = kLayer * kCells * kCells; cell < (kLayer + 1) * kCells * kCells; ++cell)
+      for (uint32_t local = kFirst; local <= kLast; ++local) faces.add(cell * kFacesPerCell + local);
+    const TriangleList list = listTriangles(domain.grids, domain.ownGrids, displacements, faces.bits());
+    for (const auto& [a, b, c] : list.triangles) {
+      const auto inWorld = [&](uint32_t vertex) { return block.frame.worldFromScene(list.vertices[vertex]); };
+      triangles.push_back({inWorld(a), inWorld(b), inWorld(c)});
+    }
+  }
+  const RandomStream random(8);
+  for (uint64_t i = 0; i < 4000; ++i) {
+    const Vec2d point(0.4 * (random.uniformDouble(2 * i) - 0.5), 1.8 * (random.uniformDouble(2 * i + 1) - 0.5));
+    EXPECT_TRUE(std::any_of(triangles.begin(), triangles.end(), [&](const auto& each) { return covers(each, point); }))
+        << point.transpose();
+  }
 }
 
 }  // namespace
