@@ -195,6 +195,19 @@ inline double computePsnr(const RenderedView& view, const RenderedView& truth, i
   return -10 * std::log10(sum / static_cast<double>(count));
 }
 
+// Returns the mean PSNR over the held-out photos.
+inline double heldOutPsnr(const CubeScene& scene, ViewRenderer& renderer) {
+  double sum = 0;
+  const std::vector<int> photos = scene.capture().photosIn(Split::test);
+  for (const int index : photos) {
+    const Photo& photo = scene.capture().photos[index];
+    const Camera& camera = scene.capture().cameras[photo.camera];
+    sum += computePsnr(renderer.render(camera, photo.worldFromCamera, nullptr),
+                       scene.truth(camera, photo.worldFromCamera));
+  }
+  return sum / static_cast<double>(photos.size());
+}
+
 // A grid around the cube, whose half side is 0.5: one block, or two (2, 1) or four (2, 2) that meet at its centre.
 inline BlockGrid cubeGrid(int columns = 1, int rows = 1) {
   BlockGrid grid;

@@ -11,18 +11,9 @@
 namespace tessera {
 namespace {
 
-// Returns the mean PSNR over the held-out photos.
 double heldOutPsnr(const CubeScene& scene, TrainedCube& trained) {
   FieldRenderer renderer(trained.trainer->model());
-  double sum = 0;
-  const std::vector<int> photos = scene.capture().photosIn(Split::test);
-  for (const int index : photos) {
-    const Photo& photo = scene.capture().photos[index];
-    const Camera& camera = scene.capture().cameras[photo.camera];
-    sum += computePsnr(renderer.render(camera, photo.worldFromCamera, nullptr),
-                       scene.truth(camera, photo.worldFromCamera));
-  }
-  return sum / static_cast<double>(photos.size());
+  return heldOutPsnr(scene, renderer);
 }
 
 std::string catchErrorMessage(const std::function<void()>& action) {

@@ -9,24 +9,16 @@
 namespace tessera {
 namespace {
 
-// Returns the mean PSNR over the held-out photos.
-double heldOut(const CubeScene& scene, HashModel& model) {
+double heldOutPsnr(const CubeScene& scene, HashModel& model) {
   HashModelRenderer renderer(model);
-  double sum = 0;
-  const std::vector<int> photos = scene.capture().photosIn(Split::test);
-  for (const int photo : photos) {
-    const Camera& camera = scene.capture().cameras[0];
-    const Pose& pose = scene.capture().photos[photo].worldFromCamera;
-    sum += computePsnr(renderer.render(camera, pose, nullptr), scene.truth(camera, pose));
-  }
-  return sum / static_cast<double>(photos.size());
+  return heldOutPsnr(scene, renderer);
 }
 
 TEST(HashTrainer, LearnsACubeInOneBlockAndInTwoThatMeetInIt) {
   const CubeScene scene;
   for (const int columns : {1, 2}) {
     TrainedHashCube trained(scene, smallHashConfig(), cubeGrid(columns), 300);
-    EXPECT_GT(heldOut(scene, trained.model()), 24) << columns << " blocks";
+    EXPECT_GT(heldOutPsnr(scene, trained.model()), 24) << columns << " blocks";
   }
 }
 
@@ -39,7 +31,7 @@ TEST(HashTrainer, LearnsWhatLiesAroundTheRegionInTheBackgroundBlock) {
     config.backgroundBlock = backgroundBlock;
     TrainedHashCube trained(scene, config, cubeGrid(), 300);
     EXPECT_EQ(trained.model().space().blocks(), backgroundBlock == std::string("own") ? 2u : 1u);
-    EXPECT_GT(heldOut(scene, trained.model()), 20) << backgroundBlock;
+    EXPECT_GT(heldOutPsnr(scene, trained.model()), 20) << backgroundBlock;
   }
 }
 
@@ -72,7 +64,7 @@ TEST(HashTrainer, LearnsWithEveryWayToFuseLevels) {
         config.attentionVaries = varies;
         if (aggregation != std::string("attention") && (attention != std::string("separate") || !varies)) continue;
         TrainedHashCube trained(scene, config, cubeGrid(), 150);
-        EXPECT_GT(heldOut(scene, trained.model()), 21) << aggregation << " " << attention << " " << varies;
+        EXPECT_GT(heldOutPsnr(scene, trained.model()), 21) << aggregation << " " << attention << " " << varies;
       }
     }
   }

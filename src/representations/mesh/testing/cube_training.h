@@ -65,15 +65,7 @@ struct CubeTraining {
 // Returns the mean PSNR of a level of the block alone in the held-out photos.
 inline double heldOutPsnr(const CubeScene& scene, MeshModel& model, uint32_t level = 0) {
   MeshPartRenderer renderer(model, level);
-  double sum = 0;
-  const std::vector<int> photos = scene.capture().photosIn(Split::test);
-  for (const int index : photos) {
-    const Photo& photo = scene.capture().photos[index];
-    const Camera& camera = scene.capture().cameras[photo.camera];
-    sum += computePsnr(renderer.render(camera, photo.worldFromCamera, nullptr),
-                       scene.truth(camera, photo.worldFromCamera));
-  }
-  return sum / static_cast<double>(photos.size());
+  return heldOutPsnr(scene, renderer);
 }
 
 }  // namespace tessera

@@ -270,13 +270,7 @@ TEST(BakeVolume, NeverHasMoreBlocksInMemoryThanItMay) {
     SceneRendererSettings settings;
     settings.selection.maximumScreenSpaceError = 0;
     VolumeRenderer renderer(opened.frame, std::move(opened.tree), std::move(opened.source), settings);
-    const Camera& camera = scene.capture().cameras[0];
-    double sum = 0;
-    for (const int photo : scene.capture().photosIn(Split::test)) {
-      const Pose& pose = scene.capture().photos[photo].worldFromCamera;
-      sum += computePsnr(renderer.render(camera, pose, nullptr), scene.truth(camera, pose));
-    }
-    return sum / static_cast<double>(scene.capture().photosIn(Split::test).size());
+    return heldOutPsnr(scene, renderer);
   };
   EXPECT_NEAR(psnr("few"), psnr("scene"), 0.1);
 }

@@ -15,24 +15,16 @@
 namespace tessera {
 namespace {
 
-// Returns the mean PSNR over the held-out photos.
-double heldOut(const CubeScene& scene, VolumeModel& model) {
+double heldOutPsnr(const CubeScene& scene, VolumeModel& model) {
   VolumeModelRenderer renderer(model, static_cast<float>(model.config().cullLast));
-  double sum = 0;
-  const std::vector<int> photos = scene.capture().photosIn(Split::test);
-  for (const int photo : photos) {
-    const Camera& camera = scene.capture().cameras[0];
-    const Pose& pose = scene.capture().photos[photo].worldFromCamera;
-    sum += computePsnr(renderer.render(camera, pose, nullptr), scene.truth(camera, pose));
-  }
-  return sum / static_cast<double>(photos.size());
+  return heldOutPsnr(scene, renderer);
 }
 
 TEST(VolumeTrainer, LearnsACubeInOneBlockAndInTwoThatMeetInIt) {
   const CubeScene scene;
   for (const int columns : {1, 2}) {
     TrainedVolumeCube trained(scene, smallVolumeConfig(), cubeGrid(columns), 300);
-    EXPECT_GT(heldOut(scene, trained.model()), 24) << columns << " blocks";
+    EXPECT_GT(heldOutPsnr(scene, trained.model()), 24) << columns << " blocks";
   }
 }
 
@@ -45,7 +37,7 @@ TEST(VolumeTrainer, LearnsWhatLiesAroundTheRegionInTheBackgroundBlock) {
     config.backgroundBlock = backgroundBlock;
     TrainedVolumeCube trained(scene, config, cubeGrid(), 300);
     EXPECT_EQ(trained.model().space().blocks(), backgroundBlock == std::string("own") ? 2u : 1u);
-    EXPECT_GT(heldOut(scene, trained.model()), 20) << backgroundBlock;
+    EXPECT_GT(heldOutPsnr(scene, trained.model()), 20) << backgroundBlock;
   }
 }
 
@@ -55,7 +47,7 @@ TEST(VolumeTrainer, LearnsACubeAndItsSurroundingsWithThePapersPreset) {
   const CubeScene scene(options);
   TrainedVolumeCube trained(scene, shrunk(VolumeConfig::ofPreset("paper")), cubeGrid(2), 300);
   EXPECT_EQ(trained.model().space().blocks(), 2u) << "no background block of its own";
-  EXPECT_GT(heldOut(scene, trained.model()), 18);
+  EXPECT_GT(heldOutPsnr(scene, trained.model()), 18);
 }
 
 // Returns the median absolute error of depth over all pixels of the held-out photos.
@@ -143,7 +135,7 @@ TEST(VolumeTrainer, LearnsACubeWithHalfOfItsBlocksInMemory) {
   // Nearly half of what the photos show is seen through three or four blocks and is excluded from training. With all
   // blocks in memory the PSNR is 23.5.
   EXPECT_NEAR(few.trainer->residency()->unserved(), 0.46, 0.1);
-  EXPECT_GT(heldOut(scene, whole), 20.5);
+  EXPECT_GT(heldOutPsnr(scene, whole), 20.5);
 }
 
 // Blocks that are regularised before they have been trained on any photo become empty.
