@@ -11,7 +11,21 @@
 namespace tessera {
 namespace {
 
-constexpr int kPhotoStride = 3;  // pixels, of the rays that find surfaces
+constexpr int kPhotoStride = 3;  // pixels, of the rays that find surfaces, at least
+
+double countTrainingPixels(const Capture& capture) {
+  double pixels = 0;
+  for (const int photo : capture.photosIn(Split::train)) {
+    const Camera& camera = capture.cameras[capture.photos[photo].camera];
+    pixels += static_cast<double>(camera.width) * camera.height;
+  }
+  return pixels;
+}
+
+// Returns the stride at which the training photos have at most `most` pixels, at least `least`.
+double strideFor(const Capture& capture, double most, double least) {
+  return std::max(least, std::sqrt(countTrainingPixels(capture) / most));
+}
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 // Returns the distances at which a ray is in a box around the origin; an empty interval if it misses it.
@@ -51,6 +65,10 @@ bool showsBehind(const MeshPart& block, const Vec3d& eye, const Vec3d& towards, 
 
 }  // namespace
 
+int tileEdge(const Capture& capture) {
+  return static_cast<int>(std::ceil(strideFor(capture, kMaxTiles, kLeastTileEdge)));
+}
+
 bool MeshStart::isEmpty() const {
   return pixels() == 0 || std::find(cells.begin(), cells.end(), true) == cells.end();
 }
@@ -64,20 +82,22 @@ double MeshStart::pixels() const {
 SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool seesPoints)
     : frame_(coarse.frame()), space_(coarse.space()), photoCount_(capture.photos.size()) {
   FieldRenderer renderer(coarse);
+  const int edge = tileEdge(capture);
   for (const int photo : capture.photosIn(Split::train)) {
     const Photo& of = capture.photos[photo];
-    addSights(photo, capture.cameras[of.camera], of.worldFromCamera, renderer);
+    addSights(photo, capture.cameras[of.camera], of.worldFromCamera, edge, renderer);
   }
   if (seesPoints) addSurface(capture, renderer);
   CullOptions options;
-  options.stride = kPhotoStride;
+  constexpr double kMaxRays = 1 << 24;
+  options.stride = static_cast<int>(std::ceil(strideFor(capture, kMaxRays, kPhotoStride)));
   renderer.cullUnseen(capture, options);
   cells_ = coarse.device().read(renderer.cells());
 }
 
-void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose, FieldRenderer& renderer) {
+void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose, int edge, FieldRenderer& renderer) {
   constexpr float kSurface = 0.5f, kClear = 0.1f;  // opacities, at least and at most
-  const CoarseView view(renderer, strideCamera(camera, kTileEdge), pose);
+  const CoarseView view(renderer, strideCamera(camera, edge), pose);
   const int columns = view.camera().width, rows = view.camera().height;
   const auto distanceAt = [&](int x, int y, float opacity) {
     const auto surface = view.surfaceAt(x, y, opacity);
@@ -108,12 +128,7 @@ void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose,
 
 void SurfaceSurvey::addSurface(const Capture& capture, FieldRenderer& renderer) {
   constexpr double kMaxPoints = 1 << 22;
-  double pixels = 0;
-  for (const int photo : capture.photosIn(Split::train)) {
-    const Camera& camera = capture.cameras[capture.photos[photo].camera];
-    pixels += static_cast<double>(camera.width) * camera.height;
-  }
-  const double stride = std::max<double>(kPhotoStride, std::sqrt(pixels / kMaxPoints));
+  const double stride = strideFor(capture, kMaxPoints, kPhotoStride);
   for (const int photo : capture.photosIn(Split::train)) {
     const Camera& camera = capture.cameras[capture.photos[photo].camera];
     const CoarseView view(renderer, strideCamera(camera, stride), capture.photos[photo].worldFromCamera);

@@ -10,7 +10,12 @@ namespace tessera {
 
 class FieldRenderer;
 
-inline constexpr int kTileEdge = 8;  // pixels of a photo; the middle of each tile is looked at
+// Photos are divided into tiles, the middle of each of which is looked at.
+inline constexpr int kLeastTileEdge = 8;  // pixels of a photo
+inline constexpr double kMaxTiles = 1 << 21;
+// Returns the edge of a tile in pixels: kLeastTileEdge, or more if the training photos would have more tiles than
+// kMaxTiles, for which neither memory nor time would suffice.
+int tileEdge(const Capture& capture);
 
 // Where the training of one part starts.
 struct MeshStart {
@@ -51,7 +56,7 @@ class SurfaceSurvey {
     double clear = 0;       // nothing is nearer in this tile and those around it, in world units
   };
 
-  void addSights(int photo, const Camera& camera, const Pose& pose, FieldRenderer& renderer);
+  void addSights(int photo, const Camera& camera, const Pose& pose, int edge, FieldRenderer& renderer);
   void addSurface(const Capture& capture, FieldRenderer& renderer);
 
   SceneFrame frame_;  // of the coarse field

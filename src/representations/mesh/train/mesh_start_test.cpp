@@ -79,6 +79,18 @@ TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
   EXPECT_EQ(survey.findStart(beside, makeOctahedraDomain(beside, 32, OctahedraPlacement::checkerboard)).pixels(), 0);
 }
 
+TEST(SurfaceSurvey, LooksAtFewerTilesOfEachPhotoTheMorePhotosThereAre) {
+  const CubeScene scene;
+  EXPECT_EQ(tileEdge(scene.capture()), kLeastTileEdge);
+  Capture large;
+  large.cameras.push_back(scene.capture().cameras[0].scaledTo(4000, 3000));
+  large.photos.resize(1000);
+  const double edge = tileEdge(large);
+  EXPECT_GT(edge, 70);
+  EXPECT_LT(edge, 80);
+  EXPECT_LE(1000 * (4000 / edge) * (3000 / edge), kMaxTiles);
+}
+
 TEST(SurfaceSurvey, FindsTheTilesThatShowOnlyWhatIsBehindABlock) {
   const CubeScene scene;
   TrainedCube coarse(scene, cubeConfig(), 300);

@@ -84,10 +84,11 @@ double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
   };
   std::vector<Sight> sights;
   std::vector<double> widths;  // of tiles
+  const int edge = tileEdge(capture);
   for (const int number : capture.photosIn(Split::train)) {
     const Photo& photo = capture.photos[number];
     const Camera& camera = capture.cameras[photo.camera];
-    const CoarseView view(renderer, strideCamera(camera, kTileEdge), photo.worldFromCamera);
+    const CoarseView view(renderer, strideCamera(camera, edge), photo.worldFromCamera);
     for (int y = 0; y < view.camera().height; ++y) {
       for (int x = 0; x < view.camera().width; ++x) {
         const auto surface = view.surfaceAt(x, y, kSurface);
