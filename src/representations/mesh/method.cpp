@@ -62,7 +62,7 @@ std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const B
     throw Error("--tiles-per-block " + std::to_string(settings.tilesPerBlock), "", "is not a power of two",
                 "use 0, 1, 2, 4, 8 or 16");
   }
-  return makeMeshBaker(loadTrainedMesh(device, folder), settings);
+  return makeMeshBaker(StoredMesh(device, folder), settings);
 }
 
 std::vector<std::pair<std::string, uint64_t>> describe(const MethodSettings& settings) {

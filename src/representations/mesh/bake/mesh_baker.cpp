@@ -53,14 +53,14 @@ struct BlockEncoder {
 
 class MeshBaker final : public Baker {
  public:
-  MeshBaker(TrainedMesh mesh, const MeshSceneSettings& settings) : mesh_(std::move(mesh)), settings_(settings) {
-    const MeshConfig& config = mesh_.parts.front()->config();
+  MeshBaker(StoredMesh mesh, const MeshSceneSettings& settings) : mesh_(std::move(mesh)), settings_(settings) {
+    const MeshConfig& config = mesh_.config();
     if (settings_.patchEdge == 0) settings_.patchEdge = static_cast<uint32_t>(config.patchTexels);
     tilesPerBlock_ = settings.tilesPerBlock > 0
                          ? settings.tilesPerBlock
                          : std::clamp(std::bit_floor(static_cast<uint32_t>(config.meshCells) / kCellsPerTile), 1u,
                                       kMaxTilesPerBlock);
-    grid_ = mesh_.grid;
+    grid_ = mesh_.grid();
     grid_.edge /= tilesPerBlock_;
     grid_.columns *= static_cast<int>(tilesPerBlock_);
     grid_.rows *= static_cast<int>(tilesPerBlock_);
@@ -68,28 +68,29 @@ class MeshBaker final : public Baker {
   }
 
   SceneDescription description() const override {
-    SceneDescription about{kMeshName, grid_, mesh_.parts.front()->config().near * tilesPerBlock_};
-    for (const auto& part : mesh_.parts)
-      if (part->atlas() && part->atlas()->coverage.pixels > 0) about.coverage.push_back(part->atlas()->coverage);
+    SceneDescription about{kMeshName, grid_, mesh_.config().near * tilesPerBlock_};
+    for (const StoredMesh::Part& each : mesh_.parts())
+      if (each.coverage) about.coverage.push_back(*each.coverage);
     return about;
   }
 
+  // Parts are in memory one after another, blocks row by row: of groups of blocks, only baked patches wait for others.
   void bake(const Capture& given, const BakeOptions& options, ContentSink& sink) override {
-    const Capture capture = applyTransientMasks(given, mesh_.folder);
+    const Capture capture = applyTransientMasks(given, mesh_.folder());
     options_ = options;
     sink_ = &sink;
     placeOn(frame_, grid_);
     frame_.georeference = capture.geo;
-    levels_ = 1;
-    for (const auto& part : mesh_.parts) levels_ = std::max(levels_, part->levels());
     photosToCome_ = static_cast<int64_t>(capture.photosIn(Split::train).size());
+    uint32_t levels = 1;
+    for (const StoredMesh::Part& each : mesh_.parts()) levels = std::max(levels, each.levels);
     passes_ = 0;
-    for (const auto& part : mesh_.parts)
-      for (uint32_t level = 0; level < (part->part().isBackground() ? 1 : levels_); ++level)
-        passes_ += isExtracted(*part, level) ? 1 : 0;
-    for (uint32_t level = 0; level < levels_; ++level) bakeLevel(capture, level);
-    for (const auto& part : mesh_.parts)
-      if (part->part().isBackground()) bakeBackground(capture, *part);
+    for (const StoredMesh::Part& each : mesh_.parts())
+      for (uint32_t level = 0; level < (each.part.isBackground() ? 1 : levels); ++level)
+        passes_ += isExtracted(each, level) ? 1 : 0;
+    for (uint32_t level = 0; level < levels; ++level) beginLevel(level);
+    for (int block = 0; block < mesh_.grid().cells(); ++block) bakeBlock(capture, block);
+    if (const StoredMesh::Part* outside = findPart(-1)) bakeBackground(capture, *outside);
   }
 
  private:
@@ -107,48 +108,63 @@ class MeshBaker final : public Baker {
     }
   }
 
-  // The blocks of a level, in tiles of cells of the scene's grid, which are pieces of a block or groups of blocks.
-  void bakeLevel(const Capture& capture, uint32_t level) {
-    const LevelGroups groups =
+  // The contents of a level: each is a group of tiles, which are cells of the scene's grid.
+  struct GrowingLevel {
+    LevelGroups groups;
+    std::map<uint32_t, GrowingContent> contents;  // by group; those that are finished are removed
+  };
+
+  void beginLevel(uint32_t level) {
+    GrowingLevel& growing = growing_.emplace_back();
+    growing.groups =
         groupsOfLevel(static_cast<uint32_t>(grid_.columns), static_cast<uint32_t>(grid_.rows), level, false);
-    std::map<uint32_t, GrowingContent> growing;  // by group
-    for (size_t group = 0; group < groups.cells.size(); ++group) {
-      const CellRange& cells = groups.cells[group];
+    for (size_t group = 0; group < growing.groups.cells.size(); ++group) {
+      const CellRange& cells = growing.groups.cells[group];
       const auto blocksAlong = [&](int axis) {
         return (cells.end[axis] + tilesPerBlock_ - 1) / tilesPerBlock_ - cells.first[axis] / tilesPerBlock_;
       };
-      GrowingContent& content = growing[static_cast<uint32_t>(group)];
+      GrowingContent& content = growing.contents[static_cast<uint32_t>(group)];
       content.blocksToCome = blocksAlong(0) * blocksAlong(1);
       // The textures of several blocks are smaller than their encoders, because their level is coarse.
       content.infersMaps = settings_.inferredMaps && content.blocksToCome == 1;
     }
-    for (int block = 0; block < mesh_.grid.cells(); ++block) {
-      std::map<uint32_t, std::vector<uint32_t>> patchesOfGroup;
-      const std::vector<uint32_t> groupsOfBlock = findGroups(groups, block);
-      for (const uint32_t group : groupsOfBlock) patchesOfGroup[group];
-      const auto part = std::find_if(mesh_.parts.begin(), mesh_.parts.end(),
-                                     [&](const auto& each) { return each->part().block == block; });
-      if (part != mesh_.parts.end()) {
-        MeshModel& model = **part;
-        const BakedPatches baked = bakePart(capture, model, level);
-        for (uint32_t patch = 0; patch < baked.patches(); ++patch) {
-          const Vec3d at = sceneFromPart(model) * baked.centre(patch);
-          patchesOfGroup[groupAt(groups, block, at)].push_back(patch);
-        }
-        std::optional<BlockEncoder> encoder;
-        if (!isFitted(model, level)) encoder = makeBlockEncoder(model, level);
-        for (auto& [group, patches] : patchesOfGroup)
-          addPatches(baked, patches, model, encoder ? &*encoder : nullptr, growing[group]);
-      }
-      for (const uint32_t group : groupsOfBlock) {
-        if (--growing[group].blocksToCome > 0) continue;
-        finish(level, groups.cells[group], growing[group]);
-        growing.erase(group);
+  }
+
+  // All levels of a block, which has no triangles if it has not been trained.
+  void bakeBlock(const Capture& capture, int block) {
+    const StoredMesh::Part* const stored = findPart(block);
+    const std::unique_ptr<MeshModel> model = stored ? mesh_.load(stored->part, MeshUse::baking) : nullptr;
+    for (uint32_t level = 0; level < growing_.size(); ++level) {
+      GrowingLevel& growing = growing_[level];
+      const std::vector<uint32_t> groups = findGroups(growing.groups, block);
+      if (model) addBlock(capture, *model, level, groups, growing);
+      for (const uint32_t group : groups) {
+        GrowingContent& content = growing.contents[group];
+        if (--content.blocksToCome > 0) continue;
+        finish(level, growing.groups.cells[group], content);
+        growing.contents.erase(group);
       }
     }
   }
 
-  void bakeBackground(const Capture& capture, MeshModel& model) {
+  void addBlock(const Capture& capture, MeshModel& model, uint32_t level, const std::vector<uint32_t>& groups,
+                GrowingLevel& growing) {
+    std::map<uint32_t, std::vector<uint32_t>> patchesOfGroup;
+    for (const uint32_t group : groups) patchesOfGroup[group];
+    const BakedPatches baked = bakePart(capture, model, level);
+    for (uint32_t patch = 0; patch < baked.patches(); ++patch) {
+      const Vec3d at = sceneFromPart(model) * baked.centre(patch);
+      patchesOfGroup[groupAt(growing.groups, model.part().block, at)].push_back(patch);
+    }
+    std::optional<BlockEncoder> encoder;
+    if (!isFitted(model, level)) encoder = makeBlockEncoder(model, level);
+    for (const auto& [group, patches] : patchesOfGroup)
+      addPatches(baked, patches, model, encoder ? &*encoder : nullptr, growing.contents[group]);
+  }
+
+  void bakeBackground(const Capture& capture, const StoredMesh::Part& outside) {
+    const std::unique_ptr<MeshModel> loaded = mesh_.load(outside.part, MeshUse::baking);
+    MeshModel& model = *loaded;
     const BakedPatches baked = bakePart(capture, model, 0);
     GrowingContent growing;
     growing.content.isBackground = true;
@@ -166,6 +182,12 @@ class MeshBaker final : public Baker {
     finish(0, std::nullopt, growing);
   }
 
+  // The part of a block, -1: of the outside; null if it has not been trained.
+  const StoredMesh::Part* findPart(int block) const {
+    const auto part = std::find_if(mesh_.parts().begin(), mesh_.parts().end(),
+                                   [&](const StoredMesh::Part& each) { return each.part.block == block; });
+    return part == mesh_.parts().end() ? nullptr : &*part;
+  }
   // The level of a part that a level of the scene shows: the coarsest, if it has fewer.
   static uint32_t findModelLevel(MeshModel& model, uint32_t level) { return std::min(level, model.levels() - 1); }
   // Whether the level has texels of its own.
@@ -173,6 +195,9 @@ class MeshBaker final : public Baker {
     return model.coarseAtlas(findModelLevel(model, level)) != nullptr;
   }
   // Whether the faces are not those of the final stage of training, so that the photos must be looked through.
+  bool isExtracted(const StoredMesh::Part& part, uint32_t level) const {
+    return !part.hasAtlas || (std::min(level, part.levels - 1) > 0 && !mesh_.config().fitsLevels());
+  }
   static bool isExtracted(MeshModel& model, uint32_t level) {
     return findModelLevel(model, level) == 0 ? !model.atlas() : !isFitted(model, level);
   }
@@ -219,13 +244,13 @@ class MeshBaker final : public Baker {
     return all;
   }
   uint32_t groupOfTile(const LevelGroups& groups, int block, uint32_t i, uint32_t j) const {
-    const uint32_t columns = static_cast<uint32_t>(mesh_.grid.columns), at = static_cast<uint32_t>(block);
+    const uint32_t columns = static_cast<uint32_t>(mesh_.grid().columns), at = static_cast<uint32_t>(block);
     const uint32_t column = at % columns * tilesPerBlock_ + i, row = at / columns * tilesPerBlock_ + j;
     return groups.groupOfBlock[column + static_cast<uint32_t>(grid_.columns) * row];
   }
   // The group of a point in a block; points beyond its walls count as at the wall.
   uint32_t groupAt(const LevelGroups& groups, int block, const Vec3d& xInScene) const {
-    const int columns = mesh_.grid.columns, tiles = static_cast<int>(tilesPerBlock_);
+    const int columns = mesh_.grid().columns, tiles = static_cast<int>(tilesPerBlock_);
     const auto tile = [&](double at, int cells, int first) {
       return static_cast<uint32_t>(std::clamp(static_cast<int>(std::floor((at + cells) / 2)) - first, 0, tiles - 1));
     };
@@ -261,11 +286,11 @@ class MeshBaker final : public Baker {
     placement.transparentBelow = MeshBakeSettings().transparentBelow;
     uint32_t resource = 0;
     if (settings_.inferredMaps) {
-      const int block = model.part().block, columns = mesh_.grid.columns;
+      const int block = model.part().block, columns = mesh_.grid().columns;
       resource = sink_->addResource(fmt::format("encoder_{}_{}", block % columns, block / columns), kEncoderMimeType,
                                     encodeMeshEncoder(encoder));
     }
-    auto inference = std::make_shared<MapInference>(*mesh_.device, encoder);
+    auto inference = std::make_shared<MapInference>(mesh_.device(), encoder);
     return {std::make_shared<SharedEncoder>(std::move(encoder)), std::move(inference), placement, resource};
   }
 
@@ -353,7 +378,7 @@ class MeshBaker final : public Baker {
 
   // The distance between texels on the longest edge of a triangle, in scene units.
   double texelEdge(uint32_t level, bool isBackground) const {
-    const MeshConfig& config = mesh_.parts.front()->config();
+    const MeshConfig& config = mesh_.config();
     const double region = std::max({2.0 * grid_.columns, 2.0 * grid_.rows, frame_.top - frame_.bottom});
     const double cell = isBackground ? region / config.backgroundCells
                                      : 2.0 * tilesPerBlock_ / (1 - 2 * kBlockMargin) / (config.meshCells >> level);
@@ -362,19 +387,20 @@ class MeshBaker final : public Baker {
     return std::numbers::sqrt2 * cell / (patchEdge - 1);
   }
 
-  TrainedMesh mesh_;
+  StoredMesh mesh_;
   MeshSceneSettings settings_;
-  uint32_t tilesPerBlock_ = 1, levels_ = 1;
+  uint32_t tilesPerBlock_ = 1;
   BlockGrid grid_;  // of tiles
   Tileset frame_;   // only its frames and its grid
   BakeOptions options_;
   ContentSink* sink_ = nullptr;
+  std::vector<GrowingLevel> growing_;
   int64_t photosToCome_ = 0, passes_ = 0, passesDone_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<Baker> makeMeshBaker(TrainedMesh mesh, const MeshSceneSettings& settings) {
+std::unique_ptr<Baker> makeMeshBaker(StoredMesh mesh, const MeshSceneSettings& settings) {
   return std::make_unique<MeshBaker>(std::move(mesh), settings);
 }
 

@@ -19,6 +19,7 @@ struct MeshSceneSettings {
   bool inferredMaps = false;   // contents of blocks have their block's encoder instead of textures, which it gives
 };
 
-std::unique_ptr<Baker> makeMeshBaker(TrainedMesh mesh, const MeshSceneSettings& settings);
+// The baker has one part of the mesh in memory at a time, and the contents that wait for more of them.
+std::unique_ptr<Baker> makeMeshBaker(StoredMesh mesh, const MeshSceneSettings& settings);
 
 }  // namespace tessera

@@ -49,7 +49,7 @@ class BakeMeshScene : public testing::Test {
 
   static fs::path model() { return *cube_ / "model"; }
   static BakedScene bake(const std::string& name, const MeshSceneSettings& settings, Device& device = *device_) {
-    const auto baker = makeMeshBaker(loadTrainedMesh(device, model()), settings);
+    const auto baker = makeMeshBaker(StoredMesh(device, model()), settings);
     return bakeScene(*baker, cube_->capture(), *cube_ / name, {});
   }
   static std::unique_ptr<SceneRenderer> open(const std::string& name, int finestLevel = 0) {

@@ -19,22 +19,25 @@ MeshFieldShape makeMeshFieldShape(const HashGridOptions& grid, int encoderWidth,
   return shape;
 }
 
-MeshField::MeshField(Device& device, MeshFieldShape shape, uint64_t seed)
+MeshField::MeshField(Device& device, MeshFieldShape shape, uint64_t seed, bool forTraining)
     : device_(device),
       shape_(std::move(shape)),
-      table_(device, "table", initialTable(shape_.grid.parameters(), seed)),
-      encoder_(device, "encoder", initialWeights(shape_.encoder, seed, 0xe0)),
-      decoder_(device, "decoder", initialWeights(shape_.decoder, seed, 0xde)) {}
+      forTraining_(forTraining),
+      table_(device, "table", initialTable(shape_.grid.parameters(), seed), forTraining),
+      encoder_(device, "encoder", initialWeights(shape_.encoder, seed, 0xe0), forTraining),
+      decoder_(device, "decoder", initialWeights(shape_.decoder, seed, 0xde), forTraining) {}
 
 void MeshField::reserve(uint32_t samples) {
   if (samples <= capacity_) return;
   capacity_ = samples;
   const size_t n = samples, inputs = static_cast<size_t>(shape_.decoder.inputs);
-  for (Array<float>* encodings : {&encoded_, &encodedGradients_}) {
-    *encodings = device_.array<float>(Matrix<float>::rowsOfPlane(n) * shape_.grid.columns());
-  }
-  for (Array<float>* rows : {&decoderInput_, &decoderInputGradients_}) *rows = device_.array<float>(n * inputs);
+  const size_t encodings = Matrix<float>::rowsOfPlane(n) * shape_.grid.columns();
+  encoded_ = device_.array<float>(encodings);
+  decoderInput_ = device_.array<float>(n * inputs);
   colours_ = device_.array<float>(n * 3);
+  if (!forTraining_) return;
+  encodedGradients_ = device_.array<float>(encodings);
+  decoderInputGradients_ = device_.array<float>(n * inputs);
   texelFeatures_ = device_.array<float>(n * kFeatures);
   encoderActivations_ = device_.allocateActivations(shape_.encoder, n);
   decoderActivations_ = device_.allocateActivations(shape_.decoder, n);
@@ -54,6 +57,7 @@ void MeshField::encode(Count samples, Slice<const float> positions, Matrix<float
 MeshField::Output MeshField::forward(Count samples, Slice<const float> positions, Slice<const float> directions,
                                      Slice<const uint32_t> rayOfSample, bool forBackward) {
   CHECK(samples.capacity <= capacity_);
+  CHECK((forTraining_ || !forBackward));
   const auto activations = [&](Array<float>& all) { return forBackward ? all.all() : Slice<float>(); };
   device_.run(HashGridForward{shape_.grid, samples, positions, table_.values, byLevel(encoded_)});
   device_.run(MlpForward{shape_.encoder, samples, byLevel(encoded_), encoder_.values, features(),
@@ -94,6 +98,7 @@ void MeshField::backward(Count samples, Slice<const float> positions, Slice<cons
 
 void MeshField::encodeForBackward(Count texels, Slice<const float> positions) {
   CHECK(texels.capacity <= capacity_);
+  CHECK(forTraining_ == true);
   device_.run(HashGridForward{shape_.grid, texels, positions, table_.values, byLevel(encoded_)});
   device_.run(
       MlpForward{shape_.encoder, texels, byLevel(encoded_), encoder_.values, encodedFeatures(), encoderActivations_});

@@ -22,8 +22,8 @@ class MeshField {
   static constexpr int kFeatures = 8;
 
   // Initialises the table to U(±1e-4) and the networks to Xavier uniform on padded sizes, as a function of `seed`
-  // alone. Keeps a reference to `device`.
-  MeshField(Device& device, MeshFieldShape shape, uint64_t seed);
+  // alone. Without `forTraining`, no backward function may be called. Keeps a reference to `device`.
+  MeshField(Device& device, MeshFieldShape shape, uint64_t seed, bool forTraining = true);
 
   // Allocates memory for this many samples in the calls below.
   void reserve(uint32_t samples);
@@ -73,12 +73,14 @@ class MeshField {
 
   Device& device_;
   MeshFieldShape shape_;
+  bool forTraining_;
   ParameterGroup table_, encoder_, decoder_;
   uint32_t capacity_ = 0;
-  Array<float> encoded_, encodedGradients_;  // [levels][Matrix::rowsOfPlane(capacity)][features]
+  Array<float> encoded_, encodedGradients_;  // [levels][Matrix::rowsOfPlane(capacity)][features]; the latter: training
   Array<float> decoderInput_;                // [capacity][features + harmonics]
   Array<float> colours_;                     // [capacity][3]
   Array<float> texelFeatures_;               // [capacity][kFeatures]
+  // Only for training:
   Array<float> encoderActivations_, decoderActivations_;
   Array<float> decoderInputGradients_;  // same shape as decoderInput_
 };

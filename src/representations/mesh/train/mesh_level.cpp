@@ -34,7 +34,7 @@ MeshLevel::MeshLevel(Device& device, uint32_t number, OctahedraDomain domain, co
       prefix_(tensorPrefix(number)),
       domain_(std::move(domain)),
       settings_(settings),
-      displacements_(device, prefix_ + "displacements", displacements),
+      displacements_(device, prefix_ + "displacements", displacements, settings.forTraining),
       occupancy_(device, occupancySpace(domain_)),
       tracedCells_(device.array<uint32_t>(domain_.grids.size() * domain_.grids[0].words())) {
   CHECK(displacements.size() == size_t{3} * domain_.grids[0].cells() * domain_.grids.size());

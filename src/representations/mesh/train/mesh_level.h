@@ -38,6 +38,7 @@ class MeshLevel {
     float opacityOffset = 0;   // added to logits
     float occupancyDecay = 1;  // per update
     bool quads = false;        // rays hit only FaceSet::quads
+    bool forTraining = true;   // else `backward` may not be called
   };
   // `number`: 0 is the finest. displacements: [grids][cells][3]. All cells are occupied. Keeps a reference to `device`.
   MeshLevel(Device& device, uint32_t number, OctahedraDomain domain, const Settings& settings,

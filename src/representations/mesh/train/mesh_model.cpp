@@ -12,6 +12,7 @@ namespace {
 
 constexpr uint32_t kPointsPerCell = 16;  // at which the opacities of cells are compared
 constexpr uint32_t kPointsAtATime = 1 << 16;
+constexpr const char* kPatchEdgeTensor = "atlas.patch_edge";
 constexpr const char* kCoverageTensor = "atlas.coverage";  // pixels, holes
 
 bool isSet(const std::vector<uint32_t>& bits, size_t i) {
@@ -66,14 +67,30 @@ std::optional<SurfaceCoverage> readCoverage(const MeshPart& part, const fs::path
   return SurfaceCoverage{part.name, numbers[0], numbers[1]};
 }
 
-MeshModel::MeshModel(Device& device, const MeshConfig& config, const MeshPart& part)
+uint32_t countLevels(const MeshConfig& config, const MeshPart& part, const Safetensors& checkpoint) {
+  const auto contains = [&](uint32_t level) {
+    return checkpoint.tensors.contains(MeshLevel::tensorPrefix(level) + "displacements");
+  };
+  uint32_t levels = 1;
+  while (levels < MeshModel::maxLevels(config, part) && contains(levels)) ++levels;
+  return levels;
+}
+
+bool hasAtlas(const Safetensors& checkpoint) {
+  return checkpoint.tensors.contains(kPatchEdgeTensor);
+}
+
+MeshModel::MeshModel(Device& device, const MeshConfig& config, const MeshPart& part, MeshUse use)
     : device_(device),
       config_(config),
       part_(part),
-      field_(device, config.shape(), static_cast<uint64_t>(config.seed)) {
+      use_(use),
+      field_(device, config.shape(), static_cast<uint64_t>(config.seed), use == MeshUse::training) {
   constexpr float kGrey = 0.5f;
-  if (part.isBackground())
-    sky_ = ParameterGroup(device, "sky", std::vector<float>(size_t{3} * 6 * kSkyResolution * kSkyResolution, kGrey));
+  if (part.isBackground()) {
+    sky_ = ParameterGroup(device, "sky", std::vector<float>(size_t{3} * 6 * kSkyResolution * kSkyResolution, kGrey),
+                          isForTraining());
+  }
   levels_.push_back(makeLevel(0, std::vector<float>(countDisplacements(domain(0)))));
 }
 
@@ -90,6 +107,7 @@ std::unique_ptr<MeshLevel> MeshModel::makeLevel(uint32_t number, const std::vect
   settings.opacityOffset = opacityOffset();
   settings.occupancyDecay = static_cast<float>(config_.occupancyDecay);
   settings.quads = config_.quads;
+  settings.forTraining = isForTraining();
   return std::make_unique<MeshLevel>(device_, number, domain(number), settings, displacements);
 }
 
@@ -167,7 +185,7 @@ void MeshModel::save(TensorSet& tensors, bool withMoments) {
   for (const ParameterGroup* group : sharedGroups()) tensors.add(device_, *group, withMoments);
   for (const auto& level : levels_) level->save(tensors, withMoments);
   if (!atlas_) return;
-  tensors.add("atlas.patch_edge", std::vector<uint32_t>{atlas_->patchEdge});
+  tensors.add(kPatchEdgeTensor, std::vector<uint32_t>{atlas_->patchEdge});
   tensors.add("atlas.ranges", atlas_->ranges);
   saveFaces(tensors, "atlas.", atlas_->faces);
   if (const SurfaceCoverage& checked = atlas_->coverage; checked.pixels > 0) {
@@ -195,11 +213,12 @@ void MeshModel::removeAtlas() {
 void MeshModel::addCoarseAtlas(FaceSet faces, const std::vector<float>& texels) {
   const uint32_t number = static_cast<uint32_t>(coarse_.size()) + 1;
   level(number).limitToFaces(faces);
-  coarse_.push_back({std::move(faces), ParameterGroup(device_, MeshLevel::tensorPrefix(number) + "texels", texels)});
+  coarse_.push_back(
+      {std::move(faces), ParameterGroup(device_, MeshLevel::tensorPrefix(number) + "texels", texels, isForTraining())});
 }
 
 void MeshModel::restoreAtlas(const fs::path& path, const Safetensors& file) {
-  const auto edge = file.require(path, "atlas.patch_edge", TensorType::u32).as<uint32_t>();
+  const auto edge = file.require(path, kPatchEdgeTensor, TensorType::u32).as<uint32_t>();
   const auto ranges = file.require(path, "atlas.ranges", TensorType::f32).as<float>();
   bool isValid = edge.size() == 1 && edge[0] == static_cast<uint32_t>(config_.patchTexels) &&
                  ranges.size() == 2 * MeshField::kFeatures;
@@ -227,11 +246,12 @@ void MeshModel::restore(const fs::path& path, const Safetensors& file) {
   for (ParameterGroup* group : sharedGroups()) loadGroup(device_, path, file, *group);
   levels_.resize(1);
   levels_[0]->restore(path, file);
-  while (levels() < maxLevels() && file.tensors.contains(MeshLevel::tensorPrefix(levels()) + "displacements")) {
+  const uint32_t stored = use_ == MeshUse::rendering ? 1 : countLevels(config_, part_, file);
+  while (levels() < stored) {
     levels_.push_back(makeLevel(levels(), std::vector<float>(countDisplacements(domain(levels())))));
     levels_.back()->restore(path, file);
   }
-  if (file.tensors.contains("atlas.patch_edge")) restoreAtlas(path, file);
+  if (hasAtlas(file)) restoreAtlas(path, file);
 }
 
 }  // namespace tessera

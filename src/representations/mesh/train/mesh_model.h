@@ -30,6 +30,10 @@ struct MeshAtlas {
 
 // Returns the coverage in a checkpoint of a part; nothing if it was not checked. Throws Error if it is malformed.
 std::optional<SurfaceCoverage> readCoverage(const MeshPart& part, const fs::path& path, const Safetensors& checkpoint);
+// Returns the number of levels in a checkpoint of a part.
+uint32_t countLevels(const MeshConfig& config, const MeshPart& part, const Safetensors& checkpoint);
+// Whether a checkpoint of a part has its atlas: that of the final stage.
+bool hasAtlas(const Safetensors& checkpoint);
 
 // The same of a coarser level, whose texels are parameters of their own, with the ranges of the finest level.
 struct CoarseAtlas {
@@ -37,10 +41,17 @@ struct CoarseAtlas {
   ParameterGroup texels;  // [texels of TexelAtlas][MeshField::kFeatures]
 };
 
+// What a model is in memory for, which determines how much of it is there.
+enum class MeshUse {
+  training,   // all
+  baking,     // no gradients and moments
+  rendering,  // of these, no coarser levels
+};
+
 class MeshModel {
  public:
   // Has the finest level. Keeps a reference to `device`.
-  MeshModel(Device& device, const MeshConfig& config, const MeshPart& part);
+  MeshModel(Device& device, const MeshConfig& config, const MeshPart& part, MeshUse use = MeshUse::training);
 
   uint32_t levels() const { return static_cast<uint32_t>(levels_.size()); }
   MeshLevel& level(uint32_t number) { return *levels_[number]; }
@@ -53,7 +64,10 @@ class MeshModel {
   const MeshConfig& config() const { return config_; }
   const MeshPart& part() const { return part_; }
   const SceneFrame& frame() const { return part_.frame; }
-  uint32_t maxLevels() const { return part_.isBackground() ? 1 : config_.levels(); }
+  uint32_t maxLevels() const { return maxLevels(config_, part_); }
+  static uint32_t maxLevels(const MeshConfig& config, const MeshPart& part) {
+    return part.isBackground() ? 1 : config.levels();
+  }
   // Nothing before the final stage. From then on, rays hit its faces alone.
   const std::optional<MeshAtlas>& atlas() const { return atlas_; }
   void setAtlas(MeshAtlas atlas);
@@ -73,7 +87,8 @@ class MeshModel {
   ParameterGroup& sky() { return sky_; }
   float opacityOffset() const { return static_cast<float>(config_.opacityOffset); }
 
-  // The state consists of the parameters (with moments for training), the levels that there are, and the atlas.
+  // The state consists of the parameters (with moments for training), the levels that there are, and the atlas. A model
+  // that is not for training restores its share of it, and is not saved.
   bool allFinite();
   void save(TensorSet& tensors, bool withMoments);
   void restore(const fs::path& path, const Safetensors& file);
@@ -84,10 +99,12 @@ class MeshModel {
   OctahedraDomain domain(uint32_t level) const { return config_.domain(part_, level); }
   std::vector<ParameterGroup*> sharedGroups();
   void restoreAtlas(const fs::path& path, const Safetensors& file);
+  bool isForTraining() const { return use_ == MeshUse::training; }
 
   Device& device_;
   MeshConfig config_;
   MeshPart part_;
+  MeshUse use_;
   MeshField field_;
   ParameterGroup sky_;  // empty for a block
   std::vector<std::unique_ptr<MeshLevel>> levels_;

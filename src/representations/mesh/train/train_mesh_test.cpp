@@ -104,6 +104,30 @@ TEST_F(TrainMesh, RecordsHowWellBlocksCoverWhatPhotosShow) {
   EXPECT_THROW(readMeshCoverage(scene / "nothing"), Error);
 }
 
+TEST_F(TrainMesh, IsLoadedAsFarAsItIsUsed) {
+  EXPECT_TRUE(train("mesh", smallOptions()).finished);
+  const StoredMesh stored(*device, scene / "mesh");
+  ASSERT_EQ(stored.parts().size(), 3u);
+  EXPECT_TRUE(stored.parts().back().part.isBackground());
+  const StoredMesh::Part& block = stored.parts().front();
+  EXPECT_GT(block.levels, 1u);
+  EXPECT_TRUE(block.hasAtlas);
+  const auto training = stored.load(block.part, MeshUse::training), baking = stored.load(block.part, MeshUse::baking),
+             rendering = stored.load(block.part, MeshUse::rendering);
+  const auto texels = [&](MeshModel& model) { return device->read(model.coarseAtlas(1)->texels.values.all()); };
+  EXPECT_GT(training->field().table().gradients.size(), 0u);
+  EXPECT_EQ(baking->field().table().gradients.size(), 0u);
+  EXPECT_EQ(baking->level(0).displacements().firstMoments.size(), 0u);
+  EXPECT_EQ(baking->coarseAtlas(1)->texels.secondMoments.size(), 0u);
+  EXPECT_EQ(baking->levels(), block.levels);
+  EXPECT_EQ(texels(*baking), texels(*training));
+  EXPECT_EQ(rendering->levels(), 1u);
+  for (MeshModel* const model : {baking.get(), rendering.get()}) {
+    EXPECT_EQ(device->read(model->field().table().values.all()), device->read(training->field().table().values.all()));
+    EXPECT_EQ(model->level(0).tracedCells(), training->level(0).tracedCells());
+  }
+}
+
 TEST_F(TrainMesh, RefusesPartsThatDoNotExist) {
   TrainMeshOptions options = smallOptions();
   options.only = {"block_2_0"};

@@ -22,19 +22,32 @@ void forEachCheckpoint(const fs::path& folder, const MeshConfig& config, const B
 
 }  // namespace
 
-TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder) {
+StoredMesh::StoredMesh(Device& device, const fs::path& folder) : device_(&device), folder_(folder) {
   const ModelFolder root(folder);
   requireManifest(root, "mesh");
-  MeshConfig config;
-  configFromToml(config.fields(), root.configPath());
-  TrainedMesh mesh{&device, requireGrid(root), {}, folder};
-  forEachCheckpoint(folder, config, mesh.grid,
+  configFromToml(config_.fields(), root.configPath());
+  grid_ = requireGrid(root);
+  forEachCheckpoint(folder, config_, grid_,
                     [&](const MeshPart& part, const fs::path& file, const Safetensors& checkpoint) {
-                      mesh.parts.push_back(std::make_unique<MeshModel>(device, config, part));
-                      mesh.parts.back()->restore(file, checkpoint);
+                      parts_.push_back({part, countLevels(config_, part, checkpoint), tessera::hasAtlas(checkpoint),
+                                        readCoverage(part, file, checkpoint)});
                     });
-  if (mesh.parts.empty())
+  if (parts_.empty())
     throw Error(folder.string(), "parts", "none has been trained yet", "go on with tessera train ... --resume");
+}
+
+std::unique_ptr<MeshModel> StoredMesh::load(const MeshPart& part, MeshUse use) const {
+  const ModelFolder trained = partFolder(folder_, part);
+  const fs::path file = trained.root() / requireManifest(trained).files.at(0);
+  auto model = std::make_unique<MeshModel>(*device_, config_, part, use);
+  model->restore(file, readSafetensors(file));
+  return model;
+}
+
+TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder) {
+  const StoredMesh stored(device, folder);
+  TrainedMesh mesh{&device, stored.grid(), {}};
+  for (const StoredMesh::Part& each : stored.parts()) mesh.parts.push_back(stored.load(each.part, MeshUse::rendering));
   return mesh;
 }
 

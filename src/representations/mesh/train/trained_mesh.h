@@ -17,15 +17,46 @@ inline ModelFolder partFolder(const fs::path& mesh, const MeshPart& part) {
   return ModelFolder(mesh / "parts" / part.name);
 }
 
+// A trained mesh whose parts are read when they are needed: those of a large place do not fit the memory together.
+class StoredMesh {
+ public:
+  // A part that has been trained, as far as its checkpoint tells without being loaded.
+  struct Part {
+    MeshPart part;
+    uint32_t levels = 1;
+    bool hasAtlas = false;
+    std::optional<SurfaceCoverage> coverage;  // MeshAtlas::coverage
+  };
+
+  // Reads the checkpoints, one at a time. Keeps a reference to `device`. Throws Error if files are missing or
+  // malformed, or if no part has been trained.
+  StoredMesh(Device& device, const fs::path& folder);
+
+  Device& device() const { return *device_; }
+  const fs::path& folder() const { return folder_; }
+  const MeshConfig& config() const { return config_; }
+  const BlockGrid& grid() const { return grid_; }
+  const std::vector<Part>& parts() const { return parts_; }  // the outside last
+
+  // Loads a part. Throws Error if its checkpoint is missing or malformed.
+  std::unique_ptr<MeshModel> load(const MeshPart& part, MeshUse use) const;
+
+ private:
+  Device* device_;
+  fs::path folder_;
+  MeshConfig config_;
+  BlockGrid grid_;
+  std::vector<Part> parts_;
+};
+
+// A trained mesh for rendering, all parts of which are in memory.
 struct TrainedMesh {
   Device* device;
   BlockGrid grid;
   std::vector<std::unique_ptr<MeshModel>> parts;  // those that have been trained, the outside last
-  fs::path folder;
 };
 
-// Loads a trained mesh for rendering. Throws Error if its files are missing or malformed, or if no part has been
-// trained.
+// Throws Error as StoredMesh does.
 TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder);
 
 // Returns how well the blocks cover what their photos show. Reads the checkpoints of all parts, one at a time. Throws
