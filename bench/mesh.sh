@@ -13,7 +13,8 @@
 #                are kept, and what opacities of 0 and 1 alone would lose
 #   holes        200 fresh views of that city from other heights: the share of pixels in which the scene's blocks have a hole, at the
 #                finest level and with levels mixed
-#   losses       one block with both losses and with the first alone, without the final stage, three seeds: PSNR of the scenes
+#   losses       one block with both losses and with the first alone, three seeds: PSNR of the scenes without the final stage, also
+#                without the distortion loss, and with the final stage
 #   alpha        the city's scene with the opacities of texels as trained, and with 1 from 0.5 on and else 0: held-out PSNR of all
 #                pixels, and of those of trees and of water
 #   quads        one block of octahedra and of MobileNeRF's quads, in the same time, three seeds, also by the pixels of roofs and of
@@ -77,11 +78,11 @@ traversal() {
   done
 }
 
-# chained MODEL CAPTURE: what each step from the model to its contents loses, with patches of 8 and of 16 texels.
+# chained MODEL CAPTURE: what each step from the model to its contents loses, with patches of 8, 12 and 16 texels.
 chained() {
   local program=build/release/bench/mesh_chain edge file
   [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_chain"
-  for edge in 8 16; do
+  for edge in 8 12 16; do
     file=$work/chain-$1-$edge.json
     if [ ! -s "$file" ]; then
       "$program" "$work/$1" "$work/$2" "$edge" > "$file.part"
@@ -94,7 +95,7 @@ chained() {
       "$(shortfall "$(jq .kept_faces.psnr "$file")" "$(jq .texels_of_8_bits.psnr "$file")")" '<=' 0.35
     verdict "$1, loss by BC4 in dB" \
       "$(shortfall "$(jq '.["opaque_from_0.8"].psnr' "$file")" "$(jq .bc4_fast.psnr "$file")")" '<=' 0.1
-    jq -r --arg edge "$edge" '"patches of \($edge) texels: model \(.model.psnr), faces kept \(.kept_faces.psnr), " +
+    jq -r --arg edge "$edge" '"patches of \($edge) texels: model \(.model.psnr), faces seen \(.seen_faces.psnr), kept \(.kept_faces.psnr), " +
       "8 bits \(.texels_of_8_bits.psnr), opacities of 0 and 1 alone \(.["binarised_at_0.5"].psnr), " +
       "as stored, opaque from 0.8 \(.["opaque_from_0.8"].psnr) with \(.["opaque_from_0.8"].hits_per_ray) hits a ray, " +
       "BC4 \(.bc4_fast.psnr), exhaustive \(.bc4_exhaustive.psnr) dB; \(.triangles) triangles, " +
@@ -225,15 +226,22 @@ final() {
   chained city-plain city
 }
 
+# second_loss WHAT BOTH FIRST ARGUMENTS...: what the second loss gains with these settings; BOTH and FIRST name the models.
+second_loss() {
+  local both first
+  both=$(seeded "$2" "${@:4}")
+  first=$(seeded "$3" --set opaque_loss=false "${@:4}")
+  echo "one block, 5 min, $1: both losses" $both "dB, the first alone" $first "dB"
+  gained "$1, gain of the second loss, SSIM" "$2" "$3" .ssim
+  gained "$1, gain of the second loss in dB" "$2" "$3" .psnr
+}
+
 losses() {
   block
-  local both first
-  both=$(seeded plain --set final_share=0)
-  first=$(seeded first --set final_share=0 --set opaque_loss=false)
-  echo "one block, 5 min: both losses" $both "dB, the first alone" $first "dB"
-  gained "gain of the second loss, SSIM" plain first .ssim
-  gained "gain of the second loss in dB" plain first .psnr
+  second_loss "without the final stage" plain first --set final_share=0
   verdict "one block, gain of the second loss in dB" "$gain" '>=' 0.5
+  second_loss "without the distortion loss, too, as in the paper" foggy foggy-first --set final_share=0 --set distortion_weight=0
+  second_loss "with the final stage" final final-first
 }
 
 # classified NAME CAPTURE FILE [--binarised]: the error of the scene NAME.scene by what pixels show, in NAME.FILE.json.

@@ -1,9 +1,9 @@
 // mesh_chain MODEL CAPTURE [PATCH_EDGE [TRIANGLES]]: what each step from a trained mesh to its baked contents loses.
-// Evaluates held-out photos with the model; with the faces that extraction keeps; with the triangles of all parts and
-// their texels of 8 bits, traced by Embree; with opacities that are 0 or 1 alone; with those that contents store; and
-// with these after BC4 compression. At most TRIANGLES faces are kept, those that contribute most. Prints PSNR, SSIM,
-// hits per ray, and numbers of faces, patches and bytes as JSON; of the blocks also the kept share of the faces in
-// their boxes, and the kept faces for each cell in which there are some. See mesh.sh.
+// Evaluates held-out photos with the model; with the faces that rays see; with those of them that extraction keeps;
+// with the triangles of all parts and their texels of 8 bits, traced by Embree; with opacities that are 0 or 1 alone;
+// with those that contents store; and with these after BC4 compression. At most TRIANGLES faces are kept, those that
+// contribute most. Prints PSNR, SSIM, hits per ray, and numbers of faces, patches and bytes as JSON; of the blocks also
+// the kept share of the faces in their boxes, and the kept faces for each cell in which there are some. See mesh.sh.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -195,10 +195,16 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
   std::vector<FaceSet> faces;
   for (const auto& part : mesh.parts) {
     ExtractionSettings settings;
-    settings.droppedShare = part->config().droppedShare;
     if (part->part().isBackground()) settings.raysPerCell = 0;
     faces.push_back(extractFaces(*part, 0, capture, nullptr, settings));
-    result["faces"].push_back(faces.back().count());
+    result["faces_seen"].push_back(faces.back().count());
+  }
+  result["extraction_seconds"] = seconds(extracting);
+  for (size_t i = 0; i < faces.size(); ++i) mesh.parts[i]->level(0).keepFaces(faces[i].bits());
+  evaluateAs("seen_faces", renderer);
+  for (size_t i = 0; i < faces.size(); ++i) {
+    faces[i].dropLeast(mesh.parts[i]->config().droppedShare);
+    result["faces"].push_back(faces[i].count());
   }
   limitFaces(faces, most);
   BlockFaces blocks;
@@ -208,7 +214,6 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
   }
   result["kept_share"] = blocks.extracted / blocks.all;
   result["kept_per_cell"] = blocks.extracted / blocks.cells;
-  result["extraction_seconds"] = seconds(extracting);
   evaluateAs("kept_faces", renderer);
 
   struct Snapping {
