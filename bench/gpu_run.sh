@@ -8,7 +8,7 @@
 #   CITY=DIR              a capture other than the bundle's city of 2x2 blocks
 #   GLIBC=packed          use the bundle's glibc, which is otherwise used only if the machine's is too old
 #   SECONDS_OF_TRAINING=60 SIZE=1920x1080 SAMPLES="65536 1048576" STREAMED=1048576
-#   LENGTH="--steps 3" VOLUME="--set max_rays=128" HASH=... FIELD=...    instead of the seconds; further flags of train
+#   LENGTH="--steps 3" VOLUME="--set max_rays=128" HASH=... FIELD=... MESH=...    instead of the seconds; further flags of train
 set -uo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 out=$(mkdir -p "${1:-$here}" && cd "${1:-$here}" && pwd)
@@ -77,8 +77,8 @@ try() {
 }
 case $device in vulkan:*) export TESSERA_GPU=${device#vulkan:} ;; esac  # for the tests
 # Methods and settings by name: hash-2 is `hash` with two levels of features, as in the paper's figures.
-declare -A method=([volume]=volume [hash]=hash [hash-2]=hash [field]=field)
-declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [hash-2]="--set fine_levels=2 ${HASH:-}" [field]=${FIELD:-})
+declare -A method=([volume]=volume [hash]=hash [hash-2]=hash [field]=field [mesh]=mesh)
+declare -A more=([volume]=${VOLUME:-} [hash]=${HASH:-} [hash-2]="--set fine_levels=2 ${HASH:-}" [field]=${FIELD:-} [mesh]=${MESH:-})
 city=${CITY:-$here/city}
 read -ra samples <<< "${SAMPLES:-65536 1048576}"
 length=${LENGTH:---minutes $(awk -v s="$seconds" 'BEGIN { print s / 60 }')}
@@ -107,9 +107,10 @@ compute() {
 fox() {
   local name blocks
   [ -n "${FOX:-}" ] || return
-  for name in field hash; do
+  local -A blocks_of=([field]="" [hash]="--blocks 1x1 --set background_block=border" [mesh]="--blocks 1x1")
+  for name in field hash mesh; do
     step "fox, $name, $length"
-    blocks=$([ "$name" = hash ] && echo "--blocks 1x1 --set background_block=border")
+    blocks=${blocks_of[$name]}
     # shellcheck disable=SC2086
     try "fox $name" tessera train "$FOX" "$work/fox-$name" --method "$name" $blocks $length --device "$device" ${more[$name]}
     try "fox $name" tessera eval "$work/fox-$name" "$FOX" --device "$device" --json "$work/fox-$name.json"
@@ -119,16 +120,17 @@ fox() {
 
 cities() {
   local name key
-  for name in volume hash hash-2; do
+  for name in volume hash hash-2 mesh; do
     step "a city of 2x2 blocks, $name, $length, and its scene"
     key=city_${name//-/_}
     # shellcheck disable=SC2086
     try "$name" tessera train "$city" "$work/$name" --method "${method[$name]}" --blocks 2x2 $length --device "$device" \
-      --set lod_step_fraction=0 ${more[$name]}
+      $([ "$name" = mesh ] || echo "--set lod_step_fraction=0") ${more[$name]}
     # Baking with a Vulkan driver for the CPU would take an hour.
     try "$name" tessera bake "$work/$name" "$work/$name.scene" --capture "$city" --device "$(has_gpu && echo "$device" || echo cpu)"
     try "$name" tessera eval "$work/$name.scene" "$city" --device "$device" --json "$work/$name.json"
     number "${key}_psnr" "$(psnr "$work/$name.json")"
+    [ "$name" = mesh ] && continue  # its scenes are drawn on the CPU
     try "$name" tessera bench frames "$work/$name.scene" --views "$city" --device "$device" --size "$size" --json "$work/$name-frames.json"
     json "${key}_frames" "$work/$name-frames.json"
   done

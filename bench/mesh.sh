@@ -29,6 +29,7 @@
 #                block in place of four
 #   processes    four blocks as four processes and one after another: equal bytes
 #   killed       killed at ten random moments, and baking at three: equal bytes
+#   memory       peak memory of baking six blocks, of rendering their model, and of both for one block
 #   vulkan       300 steps with `vulkan` against `cpu`: PSNR of the training photos
 #   fallback     the ordinary glTF meshes in the contents of that scene's finest level, in Blender, assimp and three.js: they load with
 #                the same numbers of triangles; and held-out views of three.js and Blender, without mipmaps and antialiasing, against
@@ -421,6 +422,29 @@ killed() {
   verdict "baking killed three times, status of diff" "$same" '<=' 0
 }
 
+# peak ARGUMENTS...: runs tessera, and prints its peak memory in MB. Needs the package `time` of Debian.
+peak() {
+  /usr/bin/time -f %M -o "$work/peak" "$tessera" "$@" > /dev/null
+  awk '{ print $1 / 1000 }' "$work/peak"
+}
+
+memory() {
+  need_tessera
+  local blocks name
+  local -A bake=() render=()
+  for blocks in 1x1 3x2; do
+    name=memory-$blocks
+    [ -e "$work/$name-city/transforms.json" ] ||
+      "$tessera" synth city "$work/$name-city" --blocks "$blocks" --photos 24 --size 200x150 --samples 1
+    trained "$name" "$name-city" --method mesh --blocks "$blocks" --steps 100 --set coarse_steps=300 --set samples_per_step=16384
+    rm -rf "$work/$name.scene"
+    bake[$blocks]=$(peak bake "$work/$name" "$work/$name.scene" --capture "$work/$name-city")
+    render[$blocks]=$(peak eval "$work/$name" "$work/$name-city")
+    echo "$blocks blocks: baking ${bake[$blocks]} MB, rendering the model ${render[$blocks]} MB"
+  done
+  verdict "peak memory of baking six blocks relative to one" "$(jq -n "${bake[3x2]} / ${bake[1x1]}")" '<=' 1.5
+}
+
 vulkan() {
   block
   local device
@@ -603,7 +627,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city levels final holes losses alpha quads depth views traffic borders processes killed vulkan fallback yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses alpha quads depth views traffic borders processes killed memory vulkan fallback yardstick fox beach}; do
   "$row"
 done
 finish
