@@ -34,7 +34,7 @@ PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& f
     : device_(device),
       settings_(settings),
       pool_(device.hostThreads()),
-      photos_(capture, trainingPhotos(capture),
+      photos_(capture, settings.photos.empty() ? trainingPhotos(capture) : settings.photos,
               {static_cast<size_t>(settings.photoBudgetMiB * 1048576), settings.stepsPerPhoto, settings.seed}),
       known_(findSparseDepths(capture, frame, kMaxReprojectionError)),
       cameras_(device.uploadArray(rayCameras(capture, frame))),

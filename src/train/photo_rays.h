@@ -26,6 +26,7 @@ class PhotoRays {
     // Random numbers per ray: the first is that of RayBatch, the others differ from it by multiples of the golden
     // ratio.
     uint32_t jitters = 1;
+    std::vector<int> photos = {};  // to draw from; empty: all training photos
   };
   // Draws rays from the capture's training photos; throws Error if there are none. Keeps references to `device` and
   // `capture`.

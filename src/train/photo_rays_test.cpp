@@ -44,6 +44,44 @@ TEST(PhotoRays, AreUnboundedByDefault) {
   EXPECT_GT(std::count_if(limits.distances.begin(), limits.distances.end(), [](float d) { return d > 0; }), 800);
 }
 
+TEST(PhotoRays, DecodeOnlyThePhotosThatTheyAreDrawnFrom) {
+  const CubeScene scene(withPoints());
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 1});
+  // Tiles of two photos: the same rays, whether or not the other photos are there.
+  std::vector<TileShares> tiles(scene.capture().photos.size());
+  const std::vector<int> some = {scene.capture().photosIn(Split::train)[2], scene.capture().photosIn(Split::train)[5]};
+  constexpr uint32_t kEdge = 8;
+  for (const int photo : some)
+    for (uint32_t top = 0; top < 3 * kEdge; top += kEdge)
+      for (uint32_t left = kEdge; left < 4 * kEdge; left += kEdge) {
+        if (left == 2 * kEdge && top == kEdge) continue;
+        tiles[photo].tiles.push_back({photo, left, top, left + kEdge, top + kEdge});
+        tiles[photo].until.push_back(tiles[photo].total() + 1);
+      }
+  PhotoRays::Settings settings;
+  settings.sparseDepthRayFraction = 0.5;
+  std::vector<RayBatch> batches;
+  for (const bool isLimited : {false, true}) {
+    if (isLimited) settings.photos = some;
+    PhotoRays rays(*device, scene.capture(), {}, settings);
+    rays.drawFrom(tiles);
+    rays.draw(0, kRays);
+    batches.push_back(rays.batch());
+  }
+  EXPECT_EQ(batches[0].pixels, batches[1].pixels);
+  EXPECT_EQ(batches[0].photoOfRay, batches[1].photoOfRay);
+  EXPECT_EQ(batches[0].targets, batches[1].targets);
+  int known = 0;
+  for (uint32_t ray = 0; ray < kRays; ++ray) {
+    EXPECT_TRUE(std::find(some.begin(), some.end(), batches[1].photoOfRay[ray]) != some.end());
+    const uint32_t x = static_cast<uint32_t>(batches[1].pixels[2 * size_t{ray}]),
+                   y = static_cast<uint32_t>(batches[1].pixels[2 * size_t{ray} + 1]);
+    EXPECT_TRUE(x >= kEdge && x < 4 * kEdge && y < 3 * kEdge && !(x / kEdge == 2 && y / kEdge == 1)) << x << " " << y;
+    known += batches[1].distances[ray] > 0;
+  }
+  EXPECT_GT(known, 100);
+}
+
 TEST(PhotoRays, BeginAndEndAroundTheirSparsePoint) {
   const CubeScene scene(withPoints());
   PhotoRays::Settings settings;

@@ -35,7 +35,7 @@ TiledPhotos tilePhotos(const Capture& capture, const SceneFrame& frame, const Bl
 
 // The tiles that rays are drawn from in one photo, with the running sum of their shares.
 struct TileShares {
-  std::vector<PhotoTile> tiles;
+  std::vector<PhotoTile> tiles;  // of a lattice, row by row
   std::vector<double> until;
 
   double total() const { return until.empty() ? 0 : until.back(); }

@@ -22,9 +22,15 @@ class TileDraw {
   bool isEmpty() const { return !(until_.back() > 0); }
   bool holds(int photo, const SparseDepth& pixel) const {
     const std::vector<PhotoTile>& tiles = tiles_[static_cast<size_t>(photo)].tiles;
-    return std::any_of(tiles.begin(), tiles.end(), [&](const PhotoTile& tile) {
-      return pixel.x >= tile.left && pixel.x < tile.right && pixel.y >= tile.top && pixel.y < tile.bottom;
-    });
+    const auto below =
+        std::partition_point(tiles.begin(), tiles.end(), [&](const PhotoTile& tile) { return tile.top <= pixel.y; });
+    if (below == tiles.begin()) return false;
+    const uint32_t top = std::prev(below)->top;  // of the row that may contain the pixel
+    const auto behind = std::partition_point(
+        tiles.begin(), below, [&](const PhotoTile& tile) { return tile.top < top || tile.left <= pixel.x; });
+    if (behind == tiles.begin()) return false;
+    const PhotoTile& tile = *std::prev(behind);
+    return tile.top == top && pixel.x >= tile.left && pixel.x < tile.right && pixel.y < tile.bottom;
   }
   struct Drawn {
     size_t entry;

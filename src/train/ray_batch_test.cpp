@@ -208,7 +208,7 @@ TEST(RayBatch, DrawsSparsePointsOnlyInsideTiles) {
   known[4] = {{1, 2, 1.5f}, {6, 1, 2.5f}, {3, 3, 3.5f}};  // the last one is in no tile
   known[9] = {{0, 0, 9.0f}};
   std::vector<TileShares> tiles(10);
-  tiles[4] = {{{4, 0, 0, 2, 5}, {4, 5, 1, 7, 2}}, {1, 4}};
+  tiles[4] = {{{4, 0, 0, 2, 5}, {4, 5, 0, 7, 5}}, {1, 4}};
   tiles[9] = {{{9, 3, 3, 4, 4}}, {4}};
   RayBatch batch;
   drawRays(twoPhotos(), known, {1, true, 0.5, &tiles}, 0, 4000, pool(), batch);

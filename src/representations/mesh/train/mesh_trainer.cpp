@@ -28,8 +28,11 @@ constexpr double kFinalStageRate = 0.3;  // of the learning rate, at the beginni
 // on it.
 constexpr double kConstantVertexFraction = 0.3;
 
-PhotoRays::Settings raySettings(const MeshConfig& config) {
+PhotoRays::Settings raySettings(const MeshConfig& config, const std::vector<TileShares>& tiles) {
   PhotoRays::Settings settings = config.photoRaySettings();
+  // Photos that show nothing of the part are not decoded.
+  for (size_t photo = 0; photo < tiles.size(); ++photo)
+    if (tiles[photo].total() > 0) settings.photos.push_back(static_cast<int>(photo));
   settings.randomBackground = config.randomBackground;
   if (config.depthWeight <= 0) settings.sparseDepthRayFraction = 0;
   return settings;
@@ -43,7 +46,7 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
       capture_(capture),
       config_(config),
       model_(device, config, part),
-      photoRays_(device, capture, part.frame, raySettings(config)),
+      photoRays_(device, capture, part.frame, raySettings(config, start.tiles)),
       photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config),
       finalStage_(model_, capture, start.tiles, start.pixelWidth) {
