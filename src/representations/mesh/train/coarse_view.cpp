@@ -1,6 +1,7 @@
 #include "representations/mesh/train/coarse_view.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace tessera {
 
@@ -9,10 +10,16 @@ Camera strideCamera(const Camera& camera, double stride) {
   return camera.scaledTo(strided(camera.width), strided(camera.height));
 }
 
-std::optional<CoarseView::Surface> CoarseView::surfaceAt(int x, int y, float opacity) const {
+bool CoarseView::knowsDepth(int x, int y) const {
+  constexpr double kLeastCosine = 1e-3;
   const auto inCamera = camera_.directionInCamera({x + 0.5, y + 0.5});
+  return inCamera && std::abs(inCamera->z()) >= kLeastCosine * inCamera->norm();
+}
+
+std::optional<CoarseView::Surface> CoarseView::surfaceAt(int x, int y, float opacity) const {
   const float seen = *image_.opacity.at(x, y);
-  if (!inCamera || inCamera->z() <= 0 || seen < opacity) return std::nullopt;
+  if (!knowsDepth(x, y) || seen < opacity) return std::nullopt;
+  const auto inCamera = camera_.directionInCamera({x + 0.5, y + 0.5});
   const double depth = *image_.depth.at(x, y) / seen;
   return Surface{depth, worldFromCamera_ * (*inCamera / inCamera->z() * depth)};
 }

@@ -15,7 +15,7 @@ inline constexpr float kSolidOpacity = 0.9f;  // less opaque pixels may show sev
 class CoarseView {
  public:
   struct Surface {
-    double depth;  // along the optical axis, world units
+    double depth;  // along the optical axis, world units; negative behind the camera, which some lenses see
     Vec3d at;      // in the world
   };
 
@@ -26,8 +26,10 @@ class CoarseView {
   const Camera& camera() const { return camera_; }
   const RenderedView& image() const { return image_; }
 
-  // Returns what the middle of a pixel shows at its expected depth; nothing if it is less opaque than `opacity`, or its
-  // ray is not in front of the camera.
+  // Whether the depth of a pixel says how far away it is: not for rays at right angles to the optical axis.
+  bool knowsDepth(int x, int y) const;
+  // Returns what the middle of a pixel shows at its expected depth; nothing if it is less opaque than `opacity`, or the
+  // depth is not known.
   std::optional<Surface> surfaceAt(int x, int y, float opacity) const;
 
  private:

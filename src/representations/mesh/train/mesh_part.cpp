@@ -59,6 +59,27 @@ std::optional<uint32_t> OctahedraDomain::latticeCell(const Vec3d& point) const {
   return cell;
 }
 
+Vec3d OctahedraDomain::fromLattice(const Vec3d& inCells) const {
+  Vec3d point;
+  if (boxInFront[0] > 0) {
+    constexpr double kFarthest = 2 - 1e-6;
+    const double halfCells = latticeCells() / 4.0;
+    Triple<double> x;
+    for (int axis = 0; axis < 3; ++axis) x[axis] = std::clamp(inCells[axis] / halfCells - 2, -kFarthest, kFarthest);
+    const int farthest = farthestAxis(x);
+    for (int axis = 0; axis < 3; ++axis)
+      if (axis != farthest) x[axis] = std::clamp(x[axis], -1.0, 1.0);
+    x = uncontract(x);
+    for (int axis = 0; axis < 3; ++axis) point[axis] = x[axis] * boxInFront[axis];
+  } else {
+    for (int axis = 0; axis < 3; ++axis) {
+      const float* const m = grids[0].gridFromScene.data() + size_t{4} * axis;
+      point[axis] = (inCells[axis] - m[3]) / m[axis];
+    }
+  }
+  return point;
+}
+
 std::vector<uint32_t> OctahedraDomain::toGrids(const std::vector<uint32_t>& latticeBits) const {
   const uint32_t n = grids[0].resolution, words = grids[0].words();
   const int lattice = static_cast<int>(latticeCells());

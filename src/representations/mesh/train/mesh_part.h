@@ -30,13 +30,17 @@ std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool background);
 // share; an occupancy refers to the cells of this lattice.
 struct OctahedraDomain {
   std::vector<OctahedraGrid> grids;  // for training
-  // For rendering the model: limited to the block, so that no place is in two blocks. Outside, the grids do not overlap.
+  // For rendering the model: limited to the block, so that no place is in two blocks. Outside, the grids do not
+  // overlap.
   std::vector<OctahedraGrid> ownGrids;
   std::array<float, 3> boxInFront{};  // TraceOctahedra::boxInFront
 
   uint32_t latticeCells() const { return grids[0].positionCells > 0 ? grids[0].positionCells : grids[0].resolution; }
   // Returns the number of the cell of the lattice that contains a point of the part's frame, if faces can be hit there.
   std::optional<uint32_t> latticeCell(const Vec3d& point) const;
+  // Returns a point in units of the lattice's cells in the part's frame: the inverse of the above. Points beyond the
+  // regions that have faces are moved to their edges.
+  Vec3d fromLattice(const Vec3d& inCells) const;
   // Returns the cells of all grids, [grids][words()], whose place in the lattice is set.
   std::vector<uint32_t> toGrids(const std::vector<uint32_t>& latticeBits) const;
 };

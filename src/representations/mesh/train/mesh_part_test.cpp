@@ -52,6 +52,25 @@ TEST(MeshParts, GiveEveryPointOfTheSceneToOnePart) {
   EXPECT_GT(outside, 1000);
 }
 
+TEST(MeshParts, FindThePlacesOfTheCellsOfTheirLattice) {
+  for (const MeshPart& part : makeMeshParts(twoByThree(), true)) {
+    const OctahedraDomain domain = makeOctahedraDomain(part, 8, OctahedraPlacement::checkerboard);
+    const uint32_t n = domain.latticeCells();
+    uint32_t same = 0;
+    for (uint32_t cell = 0; cell < n * n * n; ++cell) {
+      const Vec3d middle = Vec3d(cell % n, cell / n % n, cell / (n * n)) + Vec3d::Constant(0.5);
+      // Where two coordinates are beyond the region's, there are no points.
+      const Vec3d fromRegion = (middle * 4 / n - Vec3d::Constant(2)).cwiseAbs();
+      if (part.isBackground() && (fromRegion.array() > 1).count() > 1) continue;
+      const auto at = domain.latticeCell(domain.fromLattice(middle));
+      if (!at) continue;
+      EXPECT_EQ(*at, cell) << part.name;
+      ++same;
+    }
+    EXPECT_GT(same, 200u) << part.name;
+  }
+}
+
 TEST(MeshParts, ShareOneLatticeOutside) {
   MeshPart part = makeMeshParts(twoByThree(), true).back();
   const OctahedraDomain domain = makeOctahedraDomain(part, 16, OctahedraPlacement::checkerboard);

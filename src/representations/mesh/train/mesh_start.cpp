@@ -100,13 +100,14 @@ void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose,
   const CoarseView view(renderer, strideCamera(camera, edge), pose);
   const int columns = view.camera().width, rows = view.camera().height;
   const auto distanceAt = [&](int x, int y, float opacity) {
+    if (!view.knowsDepth(x, y)) return 0.0;
     const auto surface = view.surfaceAt(x, y, opacity);
     return surface ? (surface->at - pose.translation).norm() : kNever;
   };
   for (int y = 0; y < rows; ++y) {
     for (int x = 0; x < columns; ++x) {
       const auto inCamera = view.camera().directionInCamera({x + 0.5, y + 0.5});
-      if (!inCamera) continue;
+      if (!inCamera || !view.knowsDepth(x, y)) continue;
       Sight sight;
       sight.tile = {photo, static_cast<uint32_t>(camera.width * x / columns),
                     static_cast<uint32_t>(camera.height * y / rows),
@@ -165,40 +166,66 @@ std::vector<float> SurfaceSurvey::findDisplacements(const MeshPart& part, const 
   return displacements;
 }
 
+bool SurfaceSurvey::showSomethingIn(const Vec3d& low, const Vec3d& high) const {
+  const int n = space_.gridResolution;
+  int first[3], last[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    // Cells that the box hardly reaches into are left out, because something seems to be in more of them than there is.
+    constexpr double kReach = 0.125, kReachOfBox = 0.25;
+    const double reach = std::min(kReach, kReachOfBox * (high[axis] - low[axis]));
+    first[axis] = std::clamp(static_cast<int>(std::floor(low[axis] + reach)), 0, n - 1);
+    last[axis] = std::clamp(static_cast<int>(std::floor(high[axis] - reach)), first[axis], n - 1);
+  }
+  for (int k = first[2]; k <= last[2]; ++k)
+    for (int j = first[1]; j <= last[1]; ++j)
+      for (int i = first[0]; i <= last[0]; ++i) {
+        const int cell = i + n * (j + n * k);
+        if ((cells_[static_cast<size_t>(cell / 32)] >> cell % 32 & 1) != 0) return true;
+      }
+  return false;
+}
+
+std::vector<bool> SurfaceSurvey::findCells(const MeshPart& part, const OctahedraDomain& domain) const {
+  const int cells = static_cast<int>(domain.latticeCells()), corners = cells + 1;
+  const auto inCoarseCells = [&](const Vec3d& inLattice) {
+    const Vec3d at = frame_.sceneFromWorld(part.frame.worldFromScene(domain.fromLattice(inLattice)));
+    Triple<double> x = {at.x(), at.y(), at.z()};
+    if (space_.contracted) x = contract(x);
+    const double half = space_.contracted ? 2 : 1;
+    return Vec3d((Vec3d(x[0], x[1], x[2]) + Vec3d::Constant(half)) * (space_.gridResolution / (2 * half)));
+  };
+  // The corners of two layers of cells at a time.
+  const auto cornersOfLayer = [&](int k) {
+    std::vector<Vec3d> layer;
+    for (int j = 0; j < corners; ++j)
+      for (int i = 0; i < corners; ++i) layer.push_back(inCoarseCells(Vec3d(i, j, k)));
+    return layer;
+  };
+  std::vector<bool> possible(static_cast<size_t>(cells) * cells * cells);
+  std::vector<Vec3d> below = cornersOfLayer(0);
+  for (int k = 0; k < cells; ++k) {
+    std::vector<Vec3d> above = cornersOfLayer(k + 1);
+    for (int j = 0; j < cells; ++j) {
+      for (int i = 0; i < cells; ++i) {
+        if (!domain.latticeCell(domain.fromLattice(Vec3d(i + 0.5, j + 0.5, k + 0.5)))) continue;
+        Vec3d low = Vec3d::Constant(kNever), high = -low;
+        for (const std::vector<Vec3d>* layer : {&below, &above})
+          for (int corner = 0; corner < 4; ++corner) {
+            const Vec3d& at = (*layer)[static_cast<size_t>(i + corner % 2 + corners * (j + corner / 2))];
+            low = low.cwiseMin(at);
+            high = high.cwiseMax(at);
+          }
+        possible[static_cast<size_t>(i + cells * (j + cells * k))] = showSomethingIn(low, high);
+      }
+    }
+    below = std::move(above);
+  }
+  return possible;
+}
+
 MeshStart SurfaceSurvey::findStart(const MeshPart& part, const OctahedraDomain& domain) const {
   MeshStart start;
-  start.cells.assign(size_t{domain.latticeCells()} * domain.latticeCells() * domain.latticeCells(), false);
-  // Cells of the coarse field are sampled at points that are closer together than cells of the mesh.
-  const int n = space_.gridResolution;
-  const double coarseCell = (space_.contracted ? 4.0 : 2.0) / n / frame_.scale;
-  const double meshCell = 2.0 / domain.latticeCells() / part.frame.scale;
-  const int points = std::clamp(static_cast<int>(std::ceil(2 * coarseCell / meshCell)), 4, 16);
-  const auto toWorld = [&](const int place[3], const double within[3]) {
-    Triple<double> x;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double u = (place[axis] + within[axis]) / n;
-      x[axis] = space_.contracted ? 4 * u - 2 : 2 * u - 1;
-    }
-    if (space_.contracted) x = uncontract(x);
-    return frame_.worldFromScene({x[0], x[1], x[2]});
-  };
-  for (int cell = 0; cell < n * n * n; ++cell) {
-    if ((cells_[static_cast<size_t>(cell / 32)] >> cell % 32 & 1) == 0) continue;
-    const int place[3] = {cell % n, cell / n % n, cell / (n * n)};
-    if (!part.isBackground()) {
-      // A cell whose middle is farther from the grid than the cell is wide cannot overlap with it.
-      const double middle[3] = {0.5, 0.5, 0.5}, corner[3] = {0, 0, 0};
-      const Vec3d inPart = part.frame.sceneFromWorld(toWorld(place, middle));
-      const double radius = (part.frame.sceneFromWorld(toWorld(place, corner)) - inPart).norm();
-      if (inPart.cwiseAbs().maxCoeff() > 1 / (1 - 2 * kBlockMargin) + 2 * radius) continue;
-    }
-    for (int point = 0; point < points * points * points; ++point) {
-      const int within[3] = {point % points, point / points % points, point / (points * points)};
-      const double inCell[3] = {(within[0] + 0.5) / points, (within[1] + 0.5) / points, (within[2] + 0.5) / points};
-      if (const auto at = domain.latticeCell(part.frame.sceneFromWorld(toWorld(place, inCell))))
-        start.cells[*at] = true;
-    }
-  }
+  start.cells = findCells(part, domain);
 
   // An occupancy has at least one cell; this one is for what shows the sky alone.
   if (part.isBackground() && std::find(start.cells.begin(), start.cells.end(), true) == start.cells.end())

@@ -58,6 +58,10 @@ class SurfaceSurvey {
 
   void addSights(int photo, const Camera& camera, const Pose& pose, int edge, FieldRenderer& renderer);
   void addSurface(const Capture& capture, FieldRenderer& renderer);
+  // [cells of the lattice]: whether there may be a surface.
+  std::vector<bool> findCells(const MeshPart& part, const OctahedraDomain& domain) const;
+  // Whether photos see something in a box, in units of the coarse field's cells.
+  bool showSomethingIn(const Vec3d& low, const Vec3d& high) const;
 
   SceneFrame frame_;  // of the coarse field
   MarchSpace space_;

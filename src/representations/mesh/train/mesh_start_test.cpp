@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "representations/mesh/testing/cube_training.h"
+#include "representations/mesh/train/coarse_view.h"
 
 namespace tessera {
 namespace {
@@ -77,6 +80,61 @@ TEST(SurfaceSurvey, FindsTheCellsAndPixelsOfSurfacesInABlock) {
   MeshPart beside = block;
   beside.frame.centre += beside.frame.worldFromScene({3, 0, 0}) - beside.frame.worldFromScene({0, 0, 0});
   EXPECT_EQ(survey.findStart(beside, makeOctahedraDomain(beside, 32, OctahedraPlacement::checkerboard)).pixels(), 0);
+}
+
+TEST(SurfaceSurvey, FindsTheCellsOutsideOfAFlatRegion) {
+  const CubeScene scene;
+  TrainedCube coarse(scene, cubeConfig(), 300);
+  const SurfaceSurvey survey(scene.capture(), coarse.trainer->model(), false);
+  // The cells around it are eight times as wide as they are high.
+  MeshPart outside{"background", -1, {}, {1, 1, 0.125f}};
+  outside.frame.centre = CubeScene::centre();
+  outside.frame.scale = 1 / 0.4;
+  const OctahedraDomain domain = makeOctahedraDomain(outside, 32, OctahedraPlacement::checkerboard);
+  const MeshStart start = survey.findStart(outside, domain);
+  int missing = 0, all = 0;
+  for (double u = -0.48; u < 0.5; u += 0.07)
+    for (double z = -0.04; z < 0.3; z += 0.004)
+      for (int axis = 0; axis < 2; ++axis)
+        for (const double side : {-0.5, 0.5}) {
+          Vec3d at;
+          at[axis] = side;
+          at[1 - axis] = u;
+          at[2] = z;
+          const auto cell = domain.latticeCell(outside.frame.sceneFromWorld(CubeScene::centre() + at));
+          if (!cell) continue;
+          ++all;
+          missing += !start.cells[*cell];
+        }
+  EXPECT_GT(all, 1000);
+  EXPECT_LE(missing, all / 20);
+  EXPECT_LT(std::count(start.cells.begin(), start.cells.end(), true), static_cast<ptrdiff_t>(start.cells.size() / 2));
+}
+
+TEST(SurfaceSurvey, SeesSurfacesBehindTheCamera) {
+  CubeScene::Options enclosed;
+  enclosed.isEnclosed = true;
+  const CubeScene scene(enclosed);
+  TrainedCube coarse(scene, cubeConfig(), 100);
+  FieldRenderer renderer(coarse.trainer->model());
+  Camera camera;
+  camera.width = camera.height = 24;
+  camera.lens = LensModel::openCvFisheye;
+  camera.parameters = {5, 5, 12, 12};
+  const Pose& pose = scene.capture().photos[0].worldFromCamera;
+  const CoarseView view(renderer, camera, pose);
+  int behind = 0;
+  for (int y = 0; y < camera.height; ++y)
+    for (int x = 0; x < camera.width; ++x) {
+      const auto inCamera = camera.directionInCamera({x + 0.5, y + 0.5});
+      const auto surface = view.surfaceAt(x, y, 0.5f);
+      if (!inCamera || inCamera->z() > -0.05 || !surface) continue;
+      ++behind;
+      const Vec3d towards = pose.rotation * *inCamera;
+      EXPECT_GT((surface->at - pose.translation).dot(towards), 0);
+      EXPECT_LT(surface->depth, 0);
+    }
+  EXPECT_GT(behind, 10);
 }
 
 TEST(SurfaceSurvey, LooksAtFewerTilesOfEachPhotoTheMorePhotosThereAre) {

@@ -94,7 +94,7 @@ double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
         const auto surface = view.surfaceAt(x, y, kSurface);
         if (!surface) continue;
         sights.push_back({number, coarse.frame().sceneFromWorld(surface->at)});
-        widths.push_back(surface->depth / view.camera().focalX() * coarse.frame().scale);
+        widths.push_back(std::abs(surface->depth) / view.camera().focalX() * coarse.frame().scale);
       }
     }
   }
