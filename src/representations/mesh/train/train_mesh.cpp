@@ -1,6 +1,7 @@
 #include "representations/mesh/train/train_mesh.h"
 
 #include <algorithm>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -41,15 +42,24 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// The coarse field needs no details: only where surfaces are, and the exposures of the photos.
-FieldConfig coarseConfig(const MeshConfig& config) {
+// The coarse field needs no details: only where surfaces are, and the exposures of the photos. It grows with the number
+// of blocks, so that it can tell their surfaces apart.
+FieldConfig coarseConfig(const MeshConfig& config, const BlockGrid& grid) {
+  constexpr uint32_t kLeastFinest = 256, kMaxFinest = 2048;
+  constexpr uint32_t kLeastLog2Size = 15, kMaxLog2Size = 19, kBlocksOfLeast = 4;
+  constexpr int kMaxLongestOfLeast = 4;  // blocks along an edge of the region
+  const uint32_t longest = static_cast<uint32_t>(std::max(grid.columns, grid.rows));
+  const uint32_t blocks = static_cast<uint32_t>(grid.cells());
   FieldConfig coarse;
   coarse.seed = config.seed;
   coarse.photoBudgetMiB = config.photoBudgetMiB;
   coarse.samplesPerStep = 1 << 15;
-  coarse.gridLog2Size = 15;
+  coarse.gridLog2Size = static_cast<int>(
+      std::min(kMaxLog2Size, kLeastLog2Size + static_cast<uint32_t>(std::bit_width((blocks - 1) / kBlocksOfLeast))));
   coarse.gridLevels = 8;
-  coarse.gridFinest = 256;
+  coarse.gridFinest = static_cast<int>(
+      std::clamp(std::bit_ceil(static_cast<uint32_t>(config.meshCells) * longest), kLeastFinest, kMaxFinest));
+  if (longest > kMaxLongestOfLeast) coarse.occupancyResolution *= 2;
   coarse.exposure = config.exposure;
   coarse.exposureLearningRate = config.exposureLearningRate;
   return coarse;
@@ -102,9 +112,10 @@ void requireParts(const std::vector<std::string>& only, const std::vector<MeshPa
 }
 
 // Trains the coarse field. Returns false if it was asked to stop.
-bool trainCoarseField(Device& device, const Capture& capture, const fs::path& model, const TrainMeshOptions& options) {
+bool trainCoarseField(Device& device, const Capture& capture, const fs::path& model, const BlockGrid& grid,
+                      const TrainMeshOptions& options) {
   const ModelFolder folder = coarseFolder(model);
-  FieldConfig coarse = coarseConfig(options.config);
+  FieldConfig coarse = coarseConfig(options.config, grid);
   TrainingLoopOptions loop = options.loop;
   loop.resume = folder.manifest().has_value();
   if (loop.minutes > 0) {
@@ -113,11 +124,11 @@ bool trainCoarseField(Device& device, const Capture& capture, const fs::path& mo
     loop.steps = options.config.coarseSteps;
   }
   if (loop.resume) {
-    coarse.photoBudgetMiB = savedConfig<FieldConfig>(folder.root()).photoBudgetMiB;
-    requireSameConfig(folder.root(), coarse);
     // A finished field stays as it is: parts were trained from it, and other processes may be reading it.
     const ModelManifest manifest = requireManifest(folder, "field");
     if (manifest.plannedSteps > 0 && manifest.step >= manifest.plannedSteps) return true;
+    coarse.photoBudgetMiB = savedConfig<FieldConfig>(folder.root()).photoBudgetMiB;
+    requireSameConfig(folder.root(), coarse);
   }
   return trainField(device, capture, folder.root(), {coarse, loop}).finished;
 }
@@ -204,7 +215,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
   } else {
     keepLength(model, options.loop);
   }
-  if (!trainCoarseField(device, given, model, options)) return {};
+  if (!trainCoarseField(device, given, model, run.grid, options)) return {};
   compareWithCoarseField(device, given, model, config);
   writeMeshManifest(model, parts);
   const auto isRequested = [&](const std::string& name) {
