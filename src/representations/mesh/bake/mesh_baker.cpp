@@ -217,7 +217,7 @@ class MeshBaker final : public Baker {
       return bakePatches(model, 0, model.atlas()->faces, settings);
     }
     ExtractionSettings extraction;
-    extraction.photoStride = options_.stride << sceneLevel;
+    extraction.photoStride = options_.stride << level;
     // Triangles of coarse levels are few, and holes in them are large.
     if (level == 0) extraction.droppedShare = model.config().droppedShare;
     extraction.dilation = model.config().dilation;

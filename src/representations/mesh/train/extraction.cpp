@@ -118,7 +118,11 @@ void addNeighbours(MeshModel& model, uint32_t level, float minOpacity, FaceSet& 
   const OctahedraDomain& domain = model.level(level).domain();
   const std::vector<float> displacements = device.read(model.level(level).displacements().values.all());
   const uint32_t n = domain.grids[0].resolution, cells = domain.grids[0].cells();
-  const std::vector<uint32_t> neighbours = faces.neighbours(domain.grids).numbers();
+  std::vector<uint32_t> neighbours = faces.neighbours(domain.grids).numbers();
+  if (model.config().quads) {
+    const FaceSet quads = FaceSet::quads(domain.grids);
+    std::erase_if(neighbours, [&](uint32_t face) { return !quads.contains(face); });
+  }
   Array<float> positions = device.array<float>(size_t{3} * kExtractionSamples),
                logits = device.array<float>(kExtractionSamples);
   model.field().reserve(kExtractionSamples);

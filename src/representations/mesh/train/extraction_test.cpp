@@ -55,6 +55,25 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   EXPECT_EQ(heldOutPsnr(scene, model), before);
 }
 
+TEST(Extraction, AddsOnlyQuadsBesideQuads) {
+  const CubeScene scene;
+  MeshConfig config = smallMeshConfig();
+  config.finalShare = 0;
+  config.quads = true;
+  CubeTraining trained(scene, config, 200);
+  MeshModel& model = trained.trainer->model();
+  ExtractionSettings few;
+  few.photoStride = 4;
+  few.raysPerCell = 0;
+  ExtractionSettings dilated = few;
+  dilated.dilation = 2;
+  const FaceSet faces = extractFaces(model, 0, scene.capture(), nullptr, few),
+                wider = extractFaces(model, 0, scene.capture(), nullptr, dilated);
+  EXPECT_GT(wider.count(), faces.count());
+  const FaceSet quads = FaceSet::quads(model.level(0).domain().grids);
+  for (const uint32_t face : wider.numbers()) EXPECT_TRUE(quads.contains(face));
+}
+
 TEST(Extraction, CountsThePixelsThatFacesDoNotCover) {
   const CubeScene scene;
   MeshConfig config = smallMeshConfig();

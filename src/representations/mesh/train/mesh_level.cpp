@@ -165,6 +165,12 @@ void MeshLevel::save(TensorSet& tensors, bool withMoments) {
 
 void MeshLevel::restore(const fs::path& path, const Safetensors& file) {
   loadGroup(device_, path, file, displacements_);
+  for (const float displacement : device_.read(displacements_.values.all())) {
+    if (!(std::abs(displacement) <= kMaxDisplacement)) {
+      throw Error(path.string(), "tensor " + displacements_.name, "has a vertex outside of its cell",
+                  "restore the file, or train again");
+    }
+  }
   const auto values = file.require(path, prefix_ + "occupancy.values", TensorType::f32).as<float>();
   const auto bits = file.require(path, prefix_ + "occupancy.bits", TensorType::u32).as<uint32_t>();
   if (values.size() != occupancy_.cells() || bits.size() != occupancy_.cells() / 32) {

@@ -252,6 +252,8 @@ void MeshModel::restore(const fs::path& path, const Safetensors& file) {
     levels_.back()->restore(path, file);
   }
   if (hasAtlas(file)) restoreAtlas(path, file);
+  if (!allFinite())
+    throw Error(path.string(), "", "has numbers that are not finite", "restore the file, or train again");
 }
 
 }  // namespace tessera

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
+
 #include "base/error.h"
 #include "representations/mesh/testing/small_mesh.h"
 
@@ -19,6 +22,29 @@ TEST(MeshModel, RefusesAnImpossibleCoverage) {
   for (const std::vector<uint32_t>& numbers : std::vector<std::vector<uint32_t>>{{9}, {9, 10}, {0, 0}, {9, 2, 1}})
     EXPECT_THROW(read(numbers), Error);
   EXPECT_FALSE(readCoverage(part, "state", *decodeSafetensors(TensorSet().encode({}))));
+}
+
+TEST(MeshModel, RefusesDamagedNumbers) {
+  const auto device = makeDevice({"cpu", 1});
+  const auto messageWith = [&](const std::function<Slice<float>(MeshModel&)>& numbers, float number) -> std::string {
+    MeshModel model(*device, smallMeshConfig(), {"block_0_0", 0, {}, {1, 1, 1}});
+    device->write(numbers(model).part(0, 1), std::span<const float>(&number, 1));
+    TensorSet tensors;
+    model.save(tensors, true);
+    try {
+      model.restore("state", *decodeSafetensors(tensors.encode({})));
+    } catch (const Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const auto displacements = [](MeshModel& model) { return model.level(0).displacements().values.all(); };
+  const auto table = [](MeshModel& model) { return model.field().table().values.all(); };
+  EXPECT_EQ(messageWith(displacements, kMaxDisplacement), "");
+  EXPECT_NE(messageWith(displacements, 0.6f).find("outside of its cell"), std::string::npos);
+  EXPECT_NE(messageWith(displacements, NAN).find("outside of its cell"), std::string::npos);
+  EXPECT_EQ(messageWith(table, 0.5f), "");
+  EXPECT_NE(messageWith(table, INFINITY).find("not finite"), std::string::npos);
 }
 
 TEST(MeshModel, HasOnlyQuadsIfRequested) {
