@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "base/error.h"
+#include "base/memory.h"
 #include "compute/patches.h"
 #include "representations/mesh/content/patch_texels.h"
 
@@ -29,6 +30,15 @@ float sceneFactor(const OctahedraGrid& grid, const Vec3d& point) {
   return static_cast<float>(1 / (m[0] * point.x() + m[1] * point.y() + m[2] * point.z() + m[3]));
 }
 
+// Throws Error if a part has more texels than can be numbered, or than fit the memory.
+void requireRoom(double texels, uint32_t patchEdge) {
+  constexpr double kMaxTexels = 1u << 31, kBytesPerTexel = 48;  // positions here and on the device, ranks and marks
+  if (texels < kMaxTexels && texels * kBytesPerTexel < static_cast<double>(usableMemoryBytes())) return;
+  throw Error(fmt::format("--set patch_texels={}", patchEdge), "",
+              fmt::format("a part has {:.0f} million texels, more than fit the memory", texels / 1e6),
+              "use a lower number, or a lower --set mesh_cells");
+}
+
 }  // namespace
 
 TexelAtlas::TexelAtlas(MeshModel& model, uint32_t level, const FaceSet& faces, uint32_t patchEdge)
@@ -42,9 +52,13 @@ TexelAtlas::TexelAtlas(MeshModel& model, uint32_t level, const FaceSet& faces, u
   std::vector<uint32_t> patchOfFace(faceWords(domain.grids) * size_t{32}, kNoPatch);
   std::vector<float> factors, positions;
   // Those that the part owns come first, and share no patch with the others, because contents hold them alone.
-  for (const TriangleList& list : {own, listTriangles(domain.grids, domain.grids, displacements, others.bits())})
-    for (const TrianglePatch& patch : pairTriangles(list))
-      addPatch(domain, list, patch, patchOfFace, factors, positions);
+  for (const TriangleList& list : {own, listTriangles(domain.grids, domain.grids, displacements, others.bits())}) {
+    const std::vector<TrianglePatch> patches = pairTriangles(list);
+    const size_t texels = texels_ + patches.size() * patchEdge * patchEdge;
+    requireRoom(static_cast<double>(texels), patchEdge);
+    positions.reserve(size_t{3} * texels);
+    for (const TrianglePatch& patch : patches) addPatch(domain, list, patch, patchOfFace, factors, positions);
+  }
   if (factors.empty()) {  // nothing on a device is empty
     factors.resize(4, 1);
     positions.resize(3);
@@ -80,10 +94,6 @@ void TexelAtlas::addPatch(const OctahedraDomain& domain, const TriangleList& lis
     positions.insert(positions.end(), position.begin(), position.end());
   }
   texels_ += patchEdge_ * patchEdge_;
-  if (texels_ >= 1u << 31) {
-    throw Error(fmt::format("--set patch_texels={}", patchEdge_), "", "the part has more texels than fit the memory",
-                "use a lower number, or a lower --set mesh_cells");
-  }
 }
 
 void TexelAtlas::forEachOutput(MeshModel& model,
