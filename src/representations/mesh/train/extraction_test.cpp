@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
+
 #include "representations/mesh/testing/cube_training.h"
 
 namespace tessera {
@@ -53,6 +56,63 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   EXPECT_LT(heldOutPsnr(scene, model), before - 3) << "without faces nothing is left";
   model.level(0).keepFaces({});
   EXPECT_EQ(heldOutPsnr(scene, model), before);
+}
+
+// Follows the rays of all pixels of training photos, and calls use(face, opacity, accumulated opacity before the hit).
+void forEachHit(const CubeScene& scene, MeshModel& model, const std::function<void(uint32_t, double, double)>& use) {
+  constexpr uint32_t kRays = CubeScene::kWidth * CubeScene::kHeight, kMaxHits = 256, kCapacity = kRays * kMaxHits;
+  Device& device = model.device();
+  MeshHits hits(device, kRays, kCapacity);
+  Array<uint32_t> counters = device.array<uint32_t>(MeshHits::kCounters);
+  hits.counters = counters;
+  Array<float> logits = device.array<float>(kCapacity);
+  model.field().reserve(kCapacity);
+  for (const int index : scene.capture().photosIn(Split::train)) {
+    const Photo& photo = scene.capture().photos[index];
+    const Vec3f eye = model.frame().sceneFromWorld(photo.worldFromCamera.translation).cast<float>();
+    std::vector<float> origins, directions;
+    for (int y = 0; y < CubeScene::kHeight; ++y)
+      for (int x = 0; x < CubeScene::kWidth; ++x) {
+        const Vec3d inCamera = *scene.capture().cameras[photo.camera].directionInCamera({x + 0.5, y + 0.5});
+        const Vec3f direction =
+            (model.frame().rotation * (photo.worldFromCamera.rotation * inCamera)).normalized().cast<float>();
+        origins.insert(origins.end(), eye.begin(), eye.end());
+        directions.insert(directions.end(), direction.begin(), direction.end());
+      }
+    const Array<float> from = device.uploadArray(origins), along = device.uploadArray(directions);
+    model.level(0).trace({kRays, from, along, {}}, kMaxHits, false, hits);
+    model.field().encode(hits.samples(), hits.positions, Matrix<float>(logits, 1));
+    const std::vector<float> all = device.read(logits.all());
+    const std::vector<uint32_t> first = device.read(hits.firstSample.all()), faces = device.read(hits.faces.all());
+    for (uint32_t ray = 0; ray < kRays; ++ray) {
+      double transmittance = 1;
+      for (uint32_t i = first[ray]; i < first[ray + 1]; ++i) {
+        const double opacity = 1 / (1 + std::exp(-static_cast<double>(all[i] + model.opacityOffset())));
+        use(faces[i], opacity, 1 - transmittance);
+        transmittance *= 1 - opacity;
+      }
+    }
+  }
+}
+
+TEST(Extraction, KeepsExactlyTheFacesWithAWitnessRay) {
+  const CubeScene scene;
+  MeshConfig config = smallMeshConfig();
+  config.finalShare = 0;
+  CubeTraining trained(scene, config, 300);
+  MeshModel& model = trained.trainer->model();
+  ExtractionSettings photos;
+  photos.raysPerCell = 0;
+  const FaceSet faces = extractFaces(model, 0, scene.capture(), nullptr, photos);
+  constexpr double kRounding = 1e-3;
+  FaceSet clear(model.level(0).domain().grids), possible(model.level(0).domain().grids);
+  forEachHit(scene, model, [&](uint32_t face, double opacity, double before) {
+    if (opacity >= photos.minOpacity + kRounding && before <= photos.maxOpacity - kRounding) clear.add(face);
+    if (opacity >= photos.minOpacity - kRounding && before <= photos.maxOpacity + kRounding) possible.add(face);
+  });
+  EXPECT_GT(clear.count(), 100u);
+  for (const uint32_t face : clear.numbers()) EXPECT_TRUE(faces.contains(face)) << "a ray sees it";
+  for (const uint32_t face : faces.numbers()) EXPECT_TRUE(possible.contains(face)) << "no ray sees it";
 }
 
 TEST(Extraction, AddsOnlyQuadsBesideQuads) {

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <map>
 
@@ -85,6 +86,30 @@ TEST(MeshTrainer, MovesVerticesToTheSurfaceWithinTheirCells) {
   EXPECT_LE(largest, 0.5);
   for (const float d : unmoved.device->read(unmoved.trainer->model().level(0).displacements().values.all()))
     ASSERT_EQ(d, 0);
+}
+
+TEST(MeshTrainer, EmptiesOnlyCellsThatDoNotMatter) {
+  const CubeScene scene;
+  MeshConfig config = smallMeshConfig();
+  config.finalShare = 0;
+  CubeTraining trained(scene, config, 400);
+  MeshModel& model = trained.trainer->model();
+  const Photo& photo = scene.capture().photos[scene.capture().photosIn(Split::test)[1]];
+  const auto render = [&] {
+    return MeshPartRenderer(model).render(scene.capture().cameras[photo.camera], photo.worldFromCamera, nullptr);
+  };
+  const RenderedView with = render();
+  const std::vector<uint32_t> traced = model.level(0).tracedCells();
+  const size_t cells = model.level(0).domain().grids[0].cells();
+  model.level(0).exclude(std::vector<bool>(cells, true));  // all are traced from now on
+  const RenderedView without = render();
+  size_t emptied = cells;
+  for (const uint32_t word : traced) emptied -= static_cast<size_t>(std::popcount(word));
+  EXPECT_GT(emptied, cells / 4);
+  double difference = 0;
+  for (size_t i = 0; i < with.colour.pixels.size(); ++i)
+    difference += std::abs(with.colour.pixels[i] - without.colour.pixels[i]);
+  EXPECT_LT(difference / static_cast<double>(with.colour.pixels.size()), 1e-3);
 }
 
 // Returns the mean opacity of the pixels of held-out photos that show nothing.
