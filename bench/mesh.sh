@@ -233,7 +233,12 @@ second_loss() {
   both=$(seeded "$2" "${@:4}")
   first=$(seeded "$3" --set opaque_loss=false "${@:4}")
   echo "one block, 5 min, $1: both losses" $both "dB, the first alone" $first "dB"
+  local seed name
+  for seed in ${SEEDS:-1 2 3}; do
+    for name in "$2" "$3"; do classified "$name-$seed" block binarised --binarised; done
+  done
   gained "$1, gain of the second loss, SSIM" "$2" "$3" .ssim
+  gained "$1, gain of the second loss with opacities of 0 and 1 alone in dB" "$2" "$3" "[0].all.psnr" .binarised
   gained "$1, gain of the second loss in dB" "$2" "$3" .psnr
 }
 
