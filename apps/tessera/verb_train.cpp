@@ -205,13 +205,14 @@ void addTrainVerb(CLI::App& app) {
     if (flags->json) {
       fmt::print(
           "{{\"step\": {}, \"planned_steps\": {}, \"finished\": {}, \"seconds\": {:.3f}, \"psnr\": {:.4f}, "
-          "\"samples_per_second\": {:.0f}, \"device\": \"{}\"}}\n",
+          "\"samples_per_second\": {:.0f}, \"samples_per_ray\": {:.2f}, \"device\": \"{}\"}}\n",
           result.step, result.plannedSteps, result.finished, result.seconds, result.psnr, result.samplesPerSecond,
-          device->name());
+          result.samplesPerRay, device->name());
     } else {
-      fmt::print("{}: {} of {} steps in {:.0f} s, {:.2f} dB on the training photos, {:.2f} M samples/s on {}\n",
-                 flags->model, result.step, result.plannedSteps, result.seconds, result.psnr,
-                 result.samplesPerSecond / 1e6, device->name());
+      fmt::print(
+          "{}: {} of {} steps in {:.0f} s, {:.2f} dB on the training photos, {:.2f} M samples/s, {:.1f} a ray, on {}\n",
+          flags->model, result.step, result.plannedSteps, result.seconds, result.psnr, result.samplesPerSecond / 1e6,
+          result.samplesPerRay, device->name());
       if (!result.finished) fmt::print("stopped on request; {}\n", howToGoOn(flags->model));
     }
     // Signals to the shell that training has not finished, so that nothing bakes the model by mistake.

@@ -126,7 +126,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
   StepBudget budget(options.minutes);
   Window window;
   TrainingResult result;
-  double savedAt = 0, totalSamples = 0;
+  double savedAt = 0, totalSamples = 0, totalRays = 0;
   const int64_t firstStep = state.step;
   std::optional<Progress> progress;
   if (options.progress) progress.emplace("training", state.plannedSteps, "steps");
@@ -151,6 +151,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
     if (!std::isfinite(report.loss)) throw notANumber("the loss");
     window.add(report);
     totalSamples += report.samples;
+    totalRays += report.rays;
     ++state.step;
     const double now = seconds();
     if (state.plannedSteps == 0) {
@@ -177,6 +178,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
   result.finished = !unfinished();
   result.seconds = seconds();
   result.samplesPerSecond = totalSamples / std::max(1e-9, result.seconds);
+  result.samplesPerRay = totalSamples / std::max(1.0, totalRays);
   if (progress) progress->finish(fmt::format("{:.2f} dB", result.psnr));
   return result;
 }

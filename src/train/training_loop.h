@@ -56,7 +56,7 @@ struct TrainingLoopOptions {
 struct TrainingResult {
   int64_t step = 0, plannedSteps = 0;
   bool finished = false;
-  double seconds = 0, psnr = 0, samplesPerSecond = 0;
+  double seconds = 0, psnr = 0, samplesPerSecond = 0, samplesPerRay = 0;
 };
 
 // Throws Error if the folder holds a model and `resume` is off. Changes nothing.

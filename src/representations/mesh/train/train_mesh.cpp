@@ -244,7 +244,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     coarseFile = coarseFolder(model).root() / requireManifest(coarseFolder(model)).files.at(0);
   }
   const Safetensors coarseState = readSafetensors(coarseFile);
-  double shareLeft = 0, samples = 0;
+  double shareLeft = 0, samples = 0, rays = 0;
   for (const PlannedPart& plan : planned) shareLeft += plan.share;
   for (PlannedPart& plan : planned) {
     const ModelFolder folder = partFolder(model, plan.part);
@@ -275,7 +275,11 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     sum.step += result.step;
     sum.plannedSteps += result.plannedSteps;
     sum.seconds += result.seconds;
-    samples += result.seconds * result.samplesPerSecond;
+    const double samplesOfPart = result.seconds * result.samplesPerSecond;
+    samples += samplesOfPart;
+    rays += samplesOfPart / std::max(1e-9, result.samplesPerRay);
+    inform("{}: {:.1f} hits a ray, {:.2f} M a second", plan.part.name, result.samplesPerRay,
+           result.samplesPerSecond / 1e6);
     if (!plan.part.isBackground()) sum.psnr = result.psnr;
     if (!result.finished) {
       sum.finished = false;
@@ -283,6 +287,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     }
   }
   sum.samplesPerSecond = samples / std::max(1e-9, sum.seconds);
+  sum.samplesPerRay = samples / std::max(1.0, rays);
   return sum;
 }
 
