@@ -278,8 +278,10 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     const double samplesOfPart = result.seconds * result.samplesPerSecond;
     samples += samplesOfPart;
     rays += samplesOfPart / std::max(1e-9, result.samplesPerRay);
-    inform("{}: {:.1f} hits a ray, {:.2f} M a second", plan.part.name, result.samplesPerRay,
-           result.samplesPerSecond / 1e6);
+    if (samplesOfPart > 0) {  // else the part was finished before
+      inform("{}: {:.1f} hits a ray, {:.2f} M a second", plan.part.name, result.samplesPerRay,
+             result.samplesPerSecond / 1e6);
+    }
     if (!plan.part.isBackground()) sum.psnr = result.psnr;
     if (!result.finished) {
       sum.finished = false;
