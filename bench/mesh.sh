@@ -17,6 +17,8 @@
 #                without the distortion loss, and with the final stage
 #   alpha        the city's scene with the opacities of texels as trained, and with 1 from 0.5 on and else 0: held-out PSNR of all
 #                pixels, and of those of trees and of water
+#   preset       one block with other numbers of cells, texels, table entries and layers than those of the preset `cpu`, in the
+#                same time, with the first seed: held-out PSNR, SSIM and LPIPS, triangles, bytes
 #   quads        one block of octahedra and of MobileNeRF's quads, in the same time, three seeds, also by the pixels of roofs and of
 #                wires alone; and with equal numbers of triangles, without the final stage
 #   depth        one block with and without the loss of depths at sparse points, and with a weight of 0.03 in place of 1, three
@@ -273,6 +275,26 @@ alpha() {
       $binarised[0][0][$of] as $bits | "city 2x2, \($of), \($stored.pixels) pixels: opacities as trained \($stored.psnr) dB, " +
       "binarised at 0.5 \($bits.psnr) dB"' "$work/city-mesh.classes.json"
   done
+}
+
+preset() {
+  block
+  local seed=1 name change
+  while IFS=: read -r name change; do
+    SEEDS=$seed seeded "$name" $change > /dev/null
+    jq -r --arg change "${change#--set }" --slurpfile eval "$work/$name-$seed.scene-lod0.json" '.levels[0] |
+      "\(if $change == "" then "preset cpu" else $change end): PSNR \($eval[0].psnr), SSIM \($eval[0].ssim), " +
+      "LPIPS \($eval[0].lpips); \(.triangles) triangles, \(.bytes_on_disk / 1e6) MB on disk with an ordinary mesh"' \
+      "$work/$name-$seed.bake.json"
+  done <<< "final:
+cells-48:--set mesh_cells=48 --set patch_texels=12
+cells-96:--set mesh_cells=96
+texels-12:--set patch_texels=12
+table-16:--set grid_log2_size=16
+table-19:--set grid_log2_size=19
+hidden-2:--set hidden=2
+hidden-3:--set hidden=3
+features-4:--set grid_levels=8 --set grid_features=4"
 }
 
 quads() {

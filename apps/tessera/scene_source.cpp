@@ -24,8 +24,12 @@ namespace {
 template <class Renderer>
 class WarningRenderer final : public ViewRenderer {
  public:
-  WarningRenderer(const fs::path& folder, uint64_t budgetBytes, std::unique_ptr<Renderer> renderer)
-      : folder_(folder), budgetBytes_(budgetBytes), renderer_(std::move(renderer)) {}
+  WarningRenderer(const fs::path& folder, const Tileset& tileset, uint64_t budgetBytes,
+                  std::unique_ptr<Renderer> renderer)
+      : folder_(folder),
+        showsOutside_(tessera::showsOutside(tileset)),
+        budgetBytes_(budgetBytes),
+        renderer_(std::move(renderer)) {}
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override {
     RenderedView view = renderer_->render(camera, worldFromCamera, opaqueDepth);
@@ -37,18 +41,20 @@ class WarningRenderer final : public ViewRenderer {
   }
   std::string device() const override { return renderer_->device(); }
   Eigen::Array3f background() const override { return renderer_->background(); }
+  bool showsOutside() const override { return showsOutside_; }
 
  private:
   fs::path folder_;
+  bool showsOutside_;
   uint64_t budgetBytes_;
   std::unique_ptr<Renderer> renderer_;
   bool warned_ = false;
 };
 
 template <class Renderer>
-std::unique_ptr<ViewRenderer> withWarnings(const fs::path& folder, uint64_t budgetBytes,
+std::unique_ptr<ViewRenderer> withWarnings(const fs::path& folder, const Tileset& tileset, uint64_t budgetBytes,
                                            std::unique_ptr<Renderer> renderer) {
-  return std::make_unique<WarningRenderer<Renderer>>(folder, budgetBytes, std::move(renderer));
+  return std::make_unique<WarningRenderer<Renderer>>(folder, tileset, budgetBytes, std::move(renderer));
 }
 
 std::unique_ptr<ViewRenderer> makeSceneRenderer([[maybe_unused]] const Device& device, const fs::path& folder,
@@ -59,12 +65,12 @@ std::unique_ptr<ViewRenderer> makeSceneRenderer([[maybe_unused]] const Device& d
     ofGpu.draw = settings.draw;
     ofGpu.selection = settings.selection;
     ofGpu.budgetBytes = settings.budgetBytes;
-    return withWarnings(folder, settings.budgetBytes, openGpuScene(context, folder, ofGpu));
+    return withWarnings(folder, tileset, settings.budgetBytes, openGpuScene(context, folder, ofGpu));
   }
 #endif
   TileScene scene = openTileScene(folder, requireCodec(folder, tileset));
   settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
-  return withWarnings(folder, settings.budgetBytes,
+  return withWarnings(folder, tileset, settings.budgetBytes,
                       std::make_unique<SceneRenderer>(makeCpuDrawer(tileset.representation), scene.frame,
                                                       std::move(scene.tree), std::move(scene.source), settings));
 }

@@ -100,6 +100,62 @@ TEST_P(DeviceProperties, OpaqueImageIsTheCompositeByItsOpacityWhereNothingIsExcl
   EXPECT_GT(compared, 20);
 }
 
+// The normalised image has the colour's gradient, divided among the samples by their weights, and how opaque a ray is
+// as a whole makes no difference to it: Σ w (c - C) = 0, and samples of one colour have no gradients of opacity.
+TEST_P(DeviceProperties, OpaqueImageGivesTheOpacityOfARayNoGradient) {
+  Stage stage(*device, 73);
+  const uint32_t rays = 50;
+  const std::vector<uint32_t> first = stage.random.firstSamples(rays, 20);
+  OpaqueForward forward;
+  forward.threshold = 0.3f;
+  forward.rays.capacity = rays;
+  forward.firstSample = stage.input(first);
+  forward.x = stage.randomMatrix(first.back(), 1, Layout::plain, -3, 3);
+  forward.opacity = stage.output("opacity", rays);
+  const Slice<const float> gradients = stage.randomInput(3 * rays, -1, 1);
+  const auto backward = [&](Matrix<const float> colours, const std::string& name) {
+    forward.colours = colours;
+    forward.colour = stage.output(name + "Colour", 3 * rays);
+    device->run(forward);
+    OpaqueBackward a;
+    a.threshold = forward.threshold;
+    a.rays = forward.rays;
+    a.firstSample = forward.firstSample;
+    a.x = forward.x;
+    a.colours = colours;
+    a.colour = forward.colour;
+    a.rayColourGradients = gradients;
+    a.xGradients = stage.output(name + "XGradients", first.back());
+    a.colourGradients = stage.outputMatrix(name + "ColourGradients", first.back(), 3, Layout::plain);
+    device->fillZero(a.xGradients);
+    device->fillZero(a.colourGradients.data);
+    device->run(a);
+    return a;
+  };
+  const OpaqueBackward grey = backward(stage.randomMatrix(first.back(), 3, Layout::plain, 0.5f, 0.5f), "grey");
+  for (const float gradient : device->read(grey.xGradients)) EXPECT_NEAR(gradient, 0, 1e-6);
+  const OpaqueBackward a = backward(stage.randomMatrix(first.back(), 3, Layout::plain, 0, 1), "random");
+  const std::vector<float> colours = device->read(a.colours.data), image = device->read(a.colour);
+  const std::vector<float> colourGradients = device->read(a.colourGradients.data), ofImage = device->read(gradients);
+  const std::vector<float> opacity = device->read(forward.opacity);
+  int compared = 0;
+  for (uint32_t ray = 0; ray < rays; ++ray) {
+    if (opacity[ray] == 0) continue;
+    ++compared;
+    double across = 0;
+    for (uint32_t c = 0; c < 3; ++c) {
+      double sum = 0;
+      for (uint32_t i = first[ray]; i < first[ray + 1]; ++i) {
+        sum += colourGradients[3 * i + c];
+        across += colourGradients[3 * i + c] * (colours[3 * i + c] - image[3 * ray + c]);
+      }
+      EXPECT_NEAR(sum, ofImage[3 * ray + c], 2e-6) << "ray " << ray;
+    }
+    EXPECT_NEAR(across, 0, 2e-6) << "ray " << ray;
+  }
+  EXPECT_GT(compared, 20);
+}
+
 TEST_P(DeviceProperties, MarchingInRoundsMakesTheSamplesOfOneMarch) {
   Stage stage(*device, 74);
   const uint32_t rays = 50, capacity = 20000;

@@ -30,6 +30,7 @@ TEST(PatchPermutations, AreSixAndNumberedByTheirInverse) {
 // The place of a hit in its patch, in units of texels, as its texels and weights say.
 struct PlaceInPatch {
   double column = 0, row = 0, weight = 0;
+  double beyond = 0;  // weight of the texels beyond the diagonal, which a patch without a second triangle does not have
 };
 
 class PatchLookup : public testing::TestWithParam<std::string> {
@@ -68,6 +69,7 @@ class PatchLookup : public testing::TestWithParam<std::string> {
       place.column += weights[i] * (texels[i] % perPatch % patchEdge);
       place.row += weights[i] * (texels[i] % perPatch / patchEdge);
       place.weight += weights[i];
+      if (texels[i] % perPatch % patchEdge + texels[i] % perPatch / patchEdge > patchEdge) place.beyond += weights[i];
     }
     return at;
   }
@@ -117,6 +119,29 @@ TEST_P(PatchLookup, GivesFacesWithoutAPatchNoWeight) {
   const std::vector<PlaceInPatch> at = look(5, {kNoPatch, 16}, {0.2f, 0.3f, 0.2f, 0.3f});
   EXPECT_EQ(at[0].weight, 0);
   EXPECT_NEAR(at[1].weight, 1, 1e-6);
+}
+
+// A quarter of the hits lie on the triangle's longest edge, and some hits a thousandth of a texel beyond it.
+TEST_P(PatchLookup, MixesOnlyTexelsOnTheTriangle) {
+  constexpr size_t kHits = 20000;
+  for (const uint32_t patchEdge : {2u, 8u, 9u, 32u, 64u}) {
+    Random random(77);
+    const float noise = 1e-3f / static_cast<float>(patchEdge - 1);
+    std::vector<float> barycentrics;
+    for (size_t i = 0; i < kHits; ++i) {
+      const float second = random.uniform(0, 1), third = i % 4 == 0 ? 1 - second : random.uniform(0, 1 - second);
+      barycentrics.push_back(second + random.uniform(-noise, noise));
+      barycentrics.push_back(third + random.uniform(-noise, noise));
+    }
+    const std::vector<PlaceInPatch> at = look(patchEdge, std::vector<uint32_t>(kHits, 16), barycentrics);
+    for (size_t i = 0; i < kHits; ++i) {
+      const double second = barycentrics[2 * i], third = barycentrics[2 * i + 1];
+      ASSERT_NEAR(at[i].weight, 1, 1e-6);
+      ASSERT_LE(at[i].beyond, std::max(0.0, second + third - 1) * (patchEdge - 1) + 1e-5) << second << ' ' << third;
+      ASSERT_NEAR(at[i].column, second * (patchEdge - 1), 2e-3);
+      ASSERT_NEAR(at[i].row, third * (patchEdge - 1), 2e-3);
+    }
+  }
 }
 
 // The last homogeneous coordinate of a grid position under a map to the scene, and the position in the scene.

@@ -31,7 +31,12 @@ ImageF colourOver(const ImageF& image, const Eigen::Array3f& background) {
   return result;
 }
 
-ImageF readPhoto(const Photo& photo, const Camera& camera, const Eigen::Array3f& background) {
+struct ReadPhoto {
+  ImageF image;
+  bool hasAlpha = false;
+};
+
+ReadPhoto readPhoto(const Photo& photo, const Camera& camera, const Eigen::Array3f& background) {
   DecodedImage decoded = readImage(photo.image);
   if (decoded.truncated)
     warn("{}: the photo is truncated; the missing part is evaluated as grey", photo.image.string());
@@ -42,7 +47,8 @@ ImageF readPhoto(const Photo& photo, const Camera& camera, const Eigen::Array3f&
                 "import the capture again");
   }
   // The photo is composited first, because straight colour must not be averaged where alpha is 0.
-  return downscaleByArea(colourOver(toFloat(decoded.image), background), camera.width, camera.height);
+  return {downscaleByArea(colourOver(toFloat(decoded.image), background), camera.width, camera.height),
+          decoded.image.channels == 4};
 }
 
 std::optional<ImageU8> readMask(const Photo& photo, const Camera& camera) {
@@ -51,6 +57,14 @@ std::optional<ImageU8> readMask(const Photo& photo, const Camera& camera) {
   ImageU8 mask(camera.width, camera.height, 1);
   for (size_t p = 0; p < mask.pixels.size(); ++p) mask.pixels[p] = stored.pixels[p * stored.channels] < 128 ? 0 : 255;
   return mask;
+}
+
+// Excludes the pixels in which the render is less than half opaque.
+void limitToOpaque(std::optional<ImageU8>& mask, const ImageF& opacity) {
+  if (!mask) mask.emplace(opacity.width, opacity.height, 1, uint8_t{255});
+  for (size_t p = 0; p < mask->pixels.size(); ++p) {
+    if (!(opacity.pixels[p] >= 0.5f)) mask->pixels[p] = 0;
+  }
 }
 
 // Returns the argmin over g of Σ (g·rendered − photo)² on the left half, per channel.
@@ -108,9 +122,7 @@ class ViewEvaluator {
   ViewResult view(ViewRenderer& renderer, const Photo& photo, const Camera& camera) {
     ViewResult result;
     result.name = photo.name;
-    const ImageF target = readPhoto(photo, camera, renderer.background());
-    const std::optional<ImageU8> mask = readMask(photo, camera);
-    const ImageU8* maskPointer = mask ? &*mask : nullptr;
+    const auto [target, hasAlpha] = readPhoto(photo, camera, renderer.background());
 
     const auto start = std::chrono::steady_clock::now();
     const RenderedView view = renderer.render(camera, photo.worldFromCamera);
@@ -118,6 +130,13 @@ class ViewEvaluator {
     CHECK(view.colour.width == camera.width);
     CHECK(view.colour.height == camera.height);
     CHECK(view.colour.channels == 3);
+    std::optional<ImageU8> mask = readMask(photo, camera);
+    if (!renderer.showsOutside() && !hasAlpha) limitToOpaque(mask, view.opacity);
+    const ImageU8* maskPointer = mask ? &*mask : nullptr;
+    if (mask) {
+      const auto excluded = std::count(mask->pixels.begin(), mask->pixels.end(), uint8_t{0});
+      result.compared = 1 - static_cast<double>(excluded) / static_cast<double>(mask->pixels.size());
+    }
 
     ImageF rendered = compositeOver(view, renderer.background());
     if (options_.fitExposure) result.gain = fittedGain(rendered, target, maskPointer);
@@ -178,6 +197,8 @@ void summarise(EvaluationReport& report) {
       report.views, [](const ViewResult& v) { return Number(v.psnr); }, count);
   report.ssim = computeMean(
       report.views, [](const ViewResult& v) { return Number(v.ssim); }, count);
+  report.compared = computeMean(
+      report.views, [](const ViewResult& v) { return Number(v.compared); }, count);
   report.secondsPerFrame = computeMean(
       report.views, [](const ViewResult& v) { return Number(v.seconds); }, count);
   const double lpips = computeMean(

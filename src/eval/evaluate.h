@@ -22,6 +22,7 @@ struct ViewResult {
   double ssim = 0;
   std::optional<double> lpips;             // nothing without weights, or if the image is too small for the network
   std::optional<DepthError> depth;         // nothing if the photo has no depth map
+  double compared = 1;                     // share of its pixels that were compared
   std::array<double, 3> gain = {1, 1, 1};  // factor applied to the render; 1 with neutral exposure
   double seconds = 0;                      // time of rendering alone
 };
@@ -32,7 +33,7 @@ struct ViewPictures {
   const ImageF& photo;
   const ImageF& rendered;
   const RenderedView& view;
-  const ImageU8* mask;          // 1 channel, 0 = not evaluated; null without one
+  const ImageU8* mask;          // 1 channel, 0 = not evaluated; null if all pixels are
   const ImageF* measuredDepth;  // the photo's, of any size; null without one
 };
 
@@ -51,6 +52,7 @@ struct EvaluateOptions {
 
 struct EvaluationReport {
   double psnr = 0, ssim = 0;        // means over views
+  double compared = 1;              // mean share of the pixels that were compared
   std::optional<double> lpips;      // mean over the views that have it
   std::string lpipsNet;             // "alex"; empty without weights
   std::optional<DepthError> depth;  // means over the views that have it; `pixels` is the sum
@@ -67,7 +69,8 @@ struct EvaluationReport {
 // multiplied by the gain, clamped to [0, 1], and compared, unrounded, with the photo's bytes / 255. Photos larger than
 // their camera are downscaled by area averaging; photos with alpha are composited over the same background. Where a
 // photo has a mask, its black pixels are excluded from PSNR, windows that touch one are excluded from SSIM, and for
-// LPIPS they are replaced in the render by the photo's pixels.
+// LPIPS they are replaced in the render by the photo's pixels. Unless ViewRenderer::showsOutside, pixels of photos
+// without alpha in which the render is less than half opaque are excluded in the same way: they show what lies outside.
 //
 // Throws Error if the split is empty, or a photo, mask, depth or the weights cannot be read.
 EvaluationReport evaluate(ViewRenderer& renderer, const Capture& capture, const EvaluateOptions& options);

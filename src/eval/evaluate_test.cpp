@@ -89,6 +89,42 @@ TEST(Evaluate, IgnoresMaskedPixels) {
   EXPECT_LT(evaluate(renderer, fake.capture, {}).psnr, 30);
 }
 
+TEST(Evaluate, ComparesOnlyOpaquePixelsIfNothingIsShownOutside) {
+  FakeCapture fake("evaluate_outside");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  fake.add("a", photo);
+  RenderedView view = {toFloat(photo), ImageF(64, 48, 1, 1.0f), ImageF(64, 48, 1, 2.0f)};
+  for (int y = 0; y < 12; ++y) {
+    for (int x = 0; x < 64; ++x) {
+      view.opacity.at(x, y)[0] = 0.4f;
+      for (int c = 0; c < 3; ++c) view.colour.at(x, y)[c] *= 0.2f;
+    }
+  }
+  FakeRenderer renderer([&](const Camera&, int) { return view; });
+  renderer.hasOutside = false;
+  const EvaluationReport report = evaluate(renderer, fake.capture, {});
+  EXPECT_EQ(report.psnr, kMaximumPsnr);
+  EXPECT_NEAR(report.ssim, 1.0, 1e-6);
+  EXPECT_EQ(report.compared, 0.75);
+  EXPECT_EQ(report.views[0].compared, 0.75);
+  renderer.hasOutside = true;
+  const EvaluationReport whole = evaluate(renderer, fake.capture, {});
+  EXPECT_LT(whole.psnr, 30);
+  EXPECT_EQ(whole.compared, 1);
+}
+
+TEST(Evaluate, ComparesAllPixelsOfPhotosWithAlpha) {
+  FakeCapture fake("evaluate_outside_alpha");
+  ImageU8 photo(64, 48, 4, 255);
+  for (size_t p = 0; p < 64 * 12; ++p) photo.pixels[4 * p + 3] = 0;
+  fake.add("a", photo);
+  FakeRenderer renderer([&](const Camera& camera, int) { return makeEmptyView(camera); });
+  renderer.hasOutside = false;
+  const EvaluationReport report = evaluate(renderer, fake.capture, {});
+  EXPECT_EQ(report.compared, 1);
+  EXPECT_LT(report.psnr, 10);
+}
+
 TEST(Evaluate, FitsAGainOnTheLeftHalfAndEvaluatesTheRightHalf) {
   FakeCapture fake("evaluate_gain");
   const ImageU8 photo = fakePhoto(64, 48, 1);
@@ -182,6 +218,8 @@ TEST(Evaluate, WritesEveryDocumentedKeyAsJson) {
   EXPECT_TRUE(json["views"][0]["psnr"].is_null());
   EXPECT_TRUE(json["views"][0]["ssim"].is_null());
   EXPECT_EQ(json["views"][1]["name"], "b");
+  EXPECT_EQ(json["compared"], 0.5);
+  EXPECT_EQ(json["views"][0]["compared"], 0);
   EXPECT_GE(json["seconds_per_frame"].get<double>(), 0.0);
   EXPECT_EQ(json["device"], "fake <device>");
   EXPECT_EQ(json["exposure"], "neutral");

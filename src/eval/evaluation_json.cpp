@@ -50,9 +50,13 @@ std::string_view exposureName(bool fitted) {
 std::string toJson(const EvaluationReport& report) {
   ordered_json views = ordered_json::array();
   for (const ViewResult& view : report.views) {
-    ordered_json one = {
-        {"name", view.name},           {"psnr", number(view.psnr)},        {"ssim", number(view.ssim)},
-        {"lpips", number(view.lpips)}, {"depth", depthObject(view.depth)}, {"seconds", number(view.seconds)}};
+    ordered_json one = {{"name", view.name},
+                        {"psnr", number(view.psnr)},
+                        {"ssim", number(view.ssim)},
+                        {"lpips", number(view.lpips)},
+                        {"depth", depthObject(view.depth)},
+                        {"compared", view.compared},
+                        {"seconds", number(view.seconds)}};
     if (report.fitExposure) one["gain"] = view.gain;
     views.push_back(std::move(one));
   }
@@ -61,6 +65,7 @@ std::string toJson(const EvaluationReport& report) {
                          {"lpips", number(report.lpips)},
                          {"lpips_net", report.lpipsNet.empty() ? ordered_json(nullptr) : ordered_json(report.lpipsNet)},
                          {"depth", depthObject(report.depth)},
+                         {"compared", report.compared},
                          {"views", std::move(views)},
                          {"seconds_per_frame", number(report.secondsPerFrame)},
                          {"device", report.device},
@@ -71,6 +76,7 @@ std::string toJson(const EvaluationReport& report) {
                            {"ssim", "11x11 Gaussian, valid windows, mean over views"},
                            {"lpips", "version 0.1, inputs in [-1, 1], mean over views"},
                            {"depth", "z-depth in world units; absolute_relative and within_1.25 are ratios"},
+                           {"compared", "share of the pixels that were compared, mean over views"},
                            {"seconds", "rendering alone"}}}};
   if (!report.coverage.empty()) object["coverage"] = coverageToJson(report.coverage);
   return object.dump(2, ' ', false, ordered_json::error_handler_t::replace);

@@ -74,6 +74,7 @@ std::string summary(const EvaluationReport& report) {
     html += card(fmt::format("{:.2f} %", 100 * report.depth->absoluteRelative), "mean relative depth error");
     html += card(fmt::format("{:.1f} %", 100 * report.depth->within125), "of depths within a factor of 1.25");
   }
+  if (report.compared < 1) html += card(fmt::format("{:.1f} %", 100 * report.compared), "of the pixels are compared");
   if (!report.coverage.empty()) {
     html += card(fmt::format("{:.3f} %", 100 * sumCoverage(report.coverage).share()), "of surface pixels with a hole");
   }
@@ -176,7 +177,7 @@ void ReportBuilder::add(const ViewResult& result, const ViewPictures& pictures) 
     }
   }
   figures.push_back(
-      figure(fmt::format("error, black 0 to white {}{}", kBrightestError, pictures.mask ? ", grey: masked" : ""),
+      figure(fmt::format("error, black 0 to white {}{}", kBrightestError, pictures.mask ? ", grey: not compared" : ""),
              heatMap(error, 0, kBrightestError, ColourMap::inferno)));
   const ImageF depth = normalisedDepth(pictures.view);
   const auto [nearest, farthest] = depthRange(pictures.measuredDepth ? *pictures.measuredDepth : depth);

@@ -44,6 +44,8 @@ class ViewRenderer {
   virtual std::string device() const = 0;
   // Returns the colour of the background, which the caller composites under the rendered view.
   virtual Eigen::Array3f background() const { return Eigen::Array3f::Zero(); }
+  // Returns false if only the region is rendered, and pixels stay transparent that show what lies outside of it.
+  virtual bool showsOutside() const { return true; }
 };
 
 }  // namespace tessera

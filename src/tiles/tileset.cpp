@@ -118,6 +118,18 @@ std::vector<uint32_t> coarsestCover(const Tileset& tileset) {
   return cover;
 }
 
+bool showsOutside(const Tileset& tileset) {
+  SceneBox near = tileset.box();
+  near.low -= Vec3d::Constant(2);
+  near.high += Vec3d::Constant(2);
+  for (const Tile& tile : tileset.tiles) {
+    for (const TileContent& content : tile.contents) {
+      if (content.backgroundBlock || !near.contains(content.box)) return true;
+    }
+  }
+  return false;
+}
+
 uint32_t coarsestLevel(const Tileset& tileset) {
   uint32_t level = 0;
   for (const Tile& tile : tileset.tiles) {

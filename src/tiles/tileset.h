@@ -136,6 +136,10 @@ std::vector<uint32_t> childrenFrontToBack(const Tileset& tileset, uint32_t tile,
 // Returns the coarsest tiles that cover the whole scene: the root, or its descendants where it is not drawable.
 std::vector<uint32_t> coarsestCover(const Tileset& tileset);
 
+// Returns whether some content shows what lies outside of the scene's box: a background block, or a block at the border
+// that reaches farther than the edge of a block beyond it.
+bool showsOutside(const Tileset& tileset);
+
 // Returns the highest level of a tile with contents, not counting the background block; 0 if there is none.
 uint32_t coarsestLevel(const Tileset& tileset);
 

@@ -110,6 +110,16 @@ TEST(Tileset, TheCoarsestCoverLiesBelowARootThatCannotStandForIt) {
   EXPECT_EQ(coarsestCover(tileset), (std::vector<uint32_t>{1, 2, 3, 4}));
 }
 
+TEST(Tileset, ShowsWhatLiesOutsideByABackgroundBlockOrByBlocksAtTheBorder) {
+  Tileset tileset = testTileset(2);
+  EXPECT_TRUE(showsOutside(tileset));
+  for (Tile& tile : tileset.tiles)
+    std::erase_if(tile.contents, [](const TileContent& content) { return content.backgroundBlock; });
+  EXPECT_FALSE(showsOutside(tileset));
+  tileset.tiles[1].contents[0].box.low.x() = -100;
+  EXPECT_TRUE(showsOutside(tileset));
+}
+
 TEST(Tileset, ItsCoarsestLevelIsOneThatHasContentsOfItsOwn) {
   Tileset tileset = testTileset(2);
   EXPECT_EQ(coarsestLevel(tileset), 1u);

@@ -74,8 +74,10 @@ class FakeRenderer : public ViewRenderer {
   }
   std::string device() const override { return "fake <device>"; }
   Eigen::Array3f background() const override { return colourBehind; }
+  bool showsOutside() const override { return hasOutside; }
 
   Eigen::Array3f colourBehind = Eigen::Array3f::Zero();
+  bool hasOutside = true;
 
  private:
   Draw draw_;

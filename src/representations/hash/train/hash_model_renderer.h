@@ -14,6 +14,7 @@ class HashModelRenderer final : public ViewRenderer {
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override;
+  bool showsOutside() const override { return model_.space().backgroundBlock != BackgroundBlockMode::none; }
 
  private:
   HashModel& model_;

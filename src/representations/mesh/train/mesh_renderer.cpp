@@ -110,6 +110,11 @@ MeshRenderer::MeshRenderer(TrainedMesh& mesh) : mesh_(mesh) {
   for (const auto& part : mesh.parts) parts_.push_back(std::make_unique<MeshPartRenderer>(*part));
 }
 
+bool MeshRenderer::showsOutside() const {
+  return std::any_of(mesh_.parts.begin(), mesh_.parts.end(),
+                     [](const auto& model) { return model->part().isBackground(); });
+}
+
 RenderedView MeshRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
   RenderedView view = makeEmptyView(camera);
   const auto add = [&](int block) {

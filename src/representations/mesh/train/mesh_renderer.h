@@ -40,6 +40,7 @@ class MeshRenderer final : public ViewRenderer {
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override { return mesh_.device->name(); }
+  bool showsOutside() const override;
 
  private:
   TrainedMesh& mesh_;

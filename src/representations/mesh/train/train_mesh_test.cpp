@@ -150,6 +150,7 @@ TEST_F(TrainMesh, WithoutABackgroundBlockTrainsBlocksAlone) {
   ASSERT_EQ(mesh.parts.size(), 2u);
   // A ray that misses the region sees nothing.
   MeshRenderer renderer(mesh);
+  EXPECT_FALSE(renderer.showsOutside());
   Pose away = scene.capture().photos[0].worldFromCamera;
   away.rotation = away.rotation * Eigen::AngleAxisd(3.14159, Vec3d::UnitY()).toRotationMatrix();
   const RenderedView view = renderer.render(scene.capture().cameras[0].scaledTo(8, 6), away, nullptr);

@@ -16,6 +16,7 @@ class VolumeModelRenderer final : public ViewRenderer {
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   std::string device() const override;
+  bool showsOutside() const override { return model_.space().backgroundBlock != BackgroundBlockMode::none; }
 
  private:
   VolumeModel& model_;
