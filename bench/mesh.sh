@@ -14,7 +14,7 @@
 #   holes        200 fresh views of that city from other heights: the share of pixels in which the scene's blocks have a hole, at the
 #                finest level and with levels mixed
 #   losses       one block with both losses and with the first alone, three seeds: PSNR of the scenes without the final stage, also
-#                without the distortion loss, and with the final stage
+#                without the distortion loss, with the final stage, and without anything that the paper lacks
 #   alpha        the city's scene with the opacities of texels as trained, and with 1 from 0.5 on and else 0: held-out PSNR of all
 #                pixels, and of those of trees and of water
 #   preset       one block with other numbers of cells, texels, table entries and layers than those of the preset `cpu`, in the
@@ -196,6 +196,13 @@ seeded_on() {
   done
 }
 
+# by_seed FUNCTION ARGUMENTS...: calls the function with one seed after another, so that trainings that are compared follow one
+# another: the speed of a machine changes over hours.
+by_seed() {
+  local seed
+  for seed in ${SEEDS:-1 2 3}; do SEEDS=$seed "$@" > /dev/null; done
+}
+
 # gained WHAT NAME OTHER FIELD [NAME_OF_FILES]: prints the mean of the differences of a number between the same seeds of two
 # trainings, with its 95 % interval; `gain` is the mean.
 gained() {
@@ -210,8 +217,14 @@ gained() {
   gain=$mean lowest=$low
 }
 
+with_and_without_final() {
+  seeded final
+  seeded plain --set final_share=0
+}
+
 final() {
   block
+  by_seed with_and_without_final
   local with without
   with=$(seeded final)
   without=$(seeded plain --set final_share=0)
@@ -229,8 +242,14 @@ final() {
   chained city-plain city
 }
 
+both_and_first() { # BOTH FIRST ARGUMENTS...
+  seeded "$1" "${@:3}"
+  seeded "$2" --set opaque_loss=false "${@:3}"
+}
+
 # second_loss WHAT BOTH FIRST ARGUMENTS...: what the second loss gains with these settings; BOTH and FIRST name the models.
 second_loss() {
+  by_seed both_and_first "${@:2}"
   local both first
   both=$(seeded "$2" "${@:4}")
   first=$(seeded "$3" --set opaque_loss=false "${@:4}")
@@ -250,6 +269,8 @@ losses() {
   verdict "one block, gain of the second loss in dB" "$gain" '>=' 0.5
   second_loss "without the distortion loss, too, as in the paper" foggy foggy-first --set final_share=0 --set distortion_weight=0
   second_loss "with the final stage" final final-first
+  second_loss "without what the paper lacks" bare bare-first --set final_share=0 --set distortion_weight=0 \
+    --set through_share=0 --set surface_start=false --set random_background=false --set dropped_share=0 --set network_l2=0
 }
 
 # classified NAME CAPTURE FILE [--binarised]: the error of the scene NAME.scene by what pixels show, in NAME.FILE.json.
@@ -297,8 +318,18 @@ hidden-3:--set hidden=3
 features-4:--set grid_levels=8 --set grid_features=4"
 }
 
+octahedra_and_quads() {
+  seeded final
+  seeded quads --set quads=true
+}
+octahedra_and_quads_without_final() {
+  seeded plain --set final_share=0
+  seeded quads-plain --set final_share=0 --set quads=true
+}
+
 quads() {
   block
+  by_seed octahedra_and_quads
   local octahedra quads
   octahedra=$(seeded final)
   quads=$(seeded quads --set quads=true)
@@ -312,8 +343,7 @@ quads() {
     classified "quads-$seed" block classes
   done
   for class in roofs wires; do gained "octahedra less quads in pixels of $class, in dB" final quads "[0].$class.psnr" .classes; done
-  seeded plain --set final_share=0 > /dev/null
-  seeded quads-plain --set final_share=0 --set quads=true > /dev/null
+  by_seed octahedra_and_quads_without_final
   for seed in ${SEEDS:-1 2 3}; do
     faces=$(jq '.levels[0].triangles' "$work/plain-$seed.bake.json" "$work/quads-plain-$seed.bake.json" | sort -n | head -1)
     for name in plain quads-plain; do
@@ -326,11 +356,15 @@ quads() {
   gained "octahedra less quads with equal numbers of triangles in dB" plain quads-plain '["opaque_from_0.8"].psnr' .faces
 }
 
+weights_of_depth() {
+  seeded final
+  seeded no-depth --set depth_weight=0
+  seeded less-depth --set depth_weight=0.03
+}
+
 depth() {
   block
-  seeded final > /dev/null
-  seeded no-depth --set depth_weight=0 > /dev/null
-  seeded less-depth --set depth_weight=0.03 > /dev/null
+  by_seed weights_of_depth
   gained "gain of the loss of depths in dB" final no-depth .psnr
   gained "gain of its weight 1 over 0.03 in dB" final less-depth .psnr
   gained "median error of depth with weight 1, less that with 0.03" final less-depth .depth.median_absolute
@@ -533,18 +567,29 @@ withoutMasks() {
   mv "$2.part" "$2"
 }
 
+# masked_by HOW: trains on photos with cars: `given` masks, transient=auto (`auto`), or no masks (`none`).
+masked_by() {
+  local capture=traffic transient=none
+  [ "$1" != given ] || capture=traffic-masked
+  [ "$1" != auto ] || transient=auto
+  seeded_on "$capture" traffic-clean "traffic-$1" --blocks 1x1 --minutes 5 --set transient="$transient"
+}
+all_masks() {
+  local how
+  for how in given auto none; do masked_by "$how"; done
+}
+
 traffic() {
   need_tessera
   local program=build/release/bench/mesh_transients file=$work/transients.json size="--blocks 1x1 --photos 60 --size 320x240"
-  local -A capture=([given]=traffic-masked [auto]=traffic [none]=traffic)
   local name seed
   [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_transients"
   [ -e "$work/traffic-clean/transforms.json" ] || "$tessera" synth city "$work/traffic-clean" $size
   [ -e "$work/traffic-masked/transforms.json" ] || "$tessera" synth city "$work/traffic-masked" $size --traffic
   [ -e "$work/traffic/transforms.json" ] || withoutMasks "$work/traffic-masked" "$work/traffic"
+  by_seed all_masks
   for name in given auto none; do
-    echo "traffic, $name:" $(seeded_on "${capture[$name]}" traffic-clean "traffic-$name" --blocks 1x1 --minutes 5 \
-      --set transient="$([ "$name" = auto ] && echo auto || echo none)") "dB"
+    echo "traffic, $name:" $(masked_by "$name") "dB"
     for seed in ${SEEDS:-1 2 3}; do classified "traffic-$name-$seed" traffic-clean classes; done
   done
   if [ ! -s "$file" ]; then
@@ -626,11 +671,17 @@ imported() {
     "${TESSERA_SHARED_DATA:?names no folder; it must hold $1/}/$1" "$work/$1" --downscale "$2" --holdout every:8
 }
 
+with_and_without_views() { # NAME ARGUMENTS...
+  seeded_on brighton_beach brighton_beach "views-$1" "${@:2}"
+  seeded_on brighton_beach brighton_beach "no-views-$1" "${@:2}" --set enough_photos=0
+}
+
 views() {
   imported brighton_beach 4
   local how name
   for how in "minutes 5" "steps 1000"; do
     name=${how% *}
+    by_seed with_and_without_views "$name" --$how
     echo "brighton_beach, $how, with views:" $(seeded_on brighton_beach brighton_beach "views-$name" --$how) "dB"
     echo "brighton_beach, $how, without:" \
       $(seeded_on brighton_beach brighton_beach "no-views-$name" --$how --set enough_photos=0) "dB"
@@ -654,7 +705,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city levels final holes losses alpha quads depth views traffic borders processes killed memory vulkan fallback yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan fallback yardstick fox beach}; do
   "$row"
 done
 finish
