@@ -1,6 +1,7 @@
 // Settings of methods that train in blocks, and of the coarser levels of detail.
 #pragma once
 
+#include "base/error.h"
 #include "base/setting.h"
 
 namespace tessera {
@@ -17,6 +18,13 @@ struct PresetSettings {
   SETTING(std::string, preset, "cpu", "preset", "preset of all other defaults: cpu, or paper (for large GPUs)",
           anything());
 };
+
+// Returns whether the preset is `paper`; else it is `cpu`. Throws Error if there is no preset of that name.
+inline bool isPaperPreset(const std::string& name) {
+  if (name != "cpu" && name != "paper")
+    throw Error("--set preset=" + name, "", "there is no such preset", "use cpu or paper");
+  return name == "paper";
+}
 
 struct BlockSettings : BackgroundBlockSettings, PresetSettings {
   SETTING(int, lod, 0, "lod", "level of detail: 0 is the finest; set by training for coarser levels", within(0, 16));

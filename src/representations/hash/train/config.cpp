@@ -13,8 +13,7 @@ namespace tessera {
 HashConfig HashConfig::ofPreset(const std::string& name) {
   HashConfig config;
   config.preset = name;
-  if (name == "cpu") return config;
-  if (name != "paper") throw Error("--set preset=" + name, "", "there is no such preset", "use cpu or paper");
+  if (!isPaperPreset(name)) return config;
   config.backgroundBlock = "border";
   config.background = "learned";
   config.lattice = 512;

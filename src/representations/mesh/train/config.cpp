@@ -10,15 +10,14 @@ namespace tessera {
 MeshConfig MeshConfig::ofPreset(const std::string& name) {
   MeshConfig config;
   config.preset = name;
-  if (name == "cpu") return config;
-  if (name != "paper") throw Error("--set preset=" + name, "", "there is no such preset", "use cpu or paper");
+  if (!isPaperPreset(name)) return config;
   config.backgroundBlock = "none";
   config.gridLog2Size = 19;
   config.gridFinest = 2048;
   config.hidden = 3;
   config.meshCells = 128;
   config.everyCell = true;
-  config.surfaceStart = false;
+  config.coarseCells = config.surfaceStart = false;
   config.networkL2 = config.distortionWeight = config.throughShare = config.finalShare = config.droppedShare = 0;
   config.exposure = false;
   config.enoughPhotos = 0;
@@ -67,6 +66,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       constantLearningRateFractionSetting(),
       networkL2Setting(),
       vertexLearningRateSetting(),
+      coarseCellsSetting(),
       surfaceStartSetting(),
       vertexStartStepsSetting(),
       minCosineSetting(),

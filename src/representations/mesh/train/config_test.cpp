@@ -38,6 +38,7 @@ TEST(MeshConfig, HasThePapersSizesInThePaperPreset) {
   EXPECT_EQ(paper.domain(block, 0).grids[0].resolution, 128u);
   EXPECT_EQ(paper.domain(block, 4).grids[0].resolution, 8u);
   EXPECT_EQ(paper.stepsBeforeFinalStage(80000), 80000);
+  EXPECT_FALSE(paper.coarseCells);
 }
 
 }  // namespace

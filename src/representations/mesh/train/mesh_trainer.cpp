@@ -50,7 +50,7 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
       photoLoss_(device, capture, config, static_cast<uint32_t>(config.maxRays)),
       budget_(config),
       finalStage_(model_, capture, start.tiles, start.pixelWidth) {
-  model_.level(0).exclude(start.cells);
+  if (config.coarseCells || part.isBackground()) model_.level(0).exclude(start.cells);
   if (!start.displacements.empty())
     device.write(model_.level(0).displacements().values.all(), std::span<const float>(start.displacements));
   const double pixels = start.pixels();

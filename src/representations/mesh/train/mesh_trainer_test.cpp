@@ -112,6 +112,27 @@ TEST(MeshTrainer, EmptiesOnlyCellsThatDoNotMatter) {
   EXPECT_LT(difference / static_cast<double>(with.colour.pixels.size()), 1e-3);
 }
 
+// Returns the number of cells of the finest level that rays of a new training are traced through.
+size_t countFirstCells(const CubeScene& scene, bool coarseCells) {
+  MeshConfig config = smallMeshConfig();
+  config.coarseCells = coarseCells;
+  const CubeTraining begun(scene, config, 0, 2, [](const CubeScene& cube, const OctahedraDomain& domain) {
+    MeshStart start = startEverywhere(cube, domain);
+    std::fill(start.cells.begin() + 16 * 6, start.cells.end(), false);  // six rows of the lowest layer
+    return start;
+  });
+  size_t cells = 0;
+  for (const uint32_t word : begun.trainer->model().level(0).tracedCells())
+    cells += static_cast<size_t>(std::popcount(word));
+  return cells;
+}
+
+TEST(MeshTrainer, StartsWithTheCellsOfTheCoarseFieldOrAsInThePaperWithAll) {
+  const CubeScene scene;
+  EXPECT_EQ(countFirstCells(scene, true), size_t{16} * 7 * 2) << "with the cells around them";
+  EXPECT_EQ(countFirstCells(scene, false), size_t{16} * 16 * 16);
+}
+
 // Returns the mean opacity of the pixels of held-out photos that show nothing.
 double opacityBesideCube(const CubeScene& scene, MeshModel& model) {
   MeshPartRenderer renderer(model, 0);

@@ -230,7 +230,8 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
 
   const Capture capture = addViewsBetween(config.leavesTransientsOut() ? applyTransientMasks(given, model) : given,
                                           model, viewSeed(config));
-  config.photoBudgetMiB = resolvePhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());  // with the views
+  // With the views.
+  config.photoBudgetMiB = resolvePhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
   // Vertices start at the surface only in blocks whose training begins now.
   const auto startsAtSurface = [&](const MeshPart& part) {
     return config.surfaceStart && !part.isBackground() && isRequested(part.name) && !partFolder(model, part).manifest();

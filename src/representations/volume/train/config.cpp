@@ -1,6 +1,5 @@
 #include "representations/volume/train/config.h"
 
-#include "base/error.h"
 #include "train/block_frame.h"
 
 namespace tessera {
@@ -8,8 +7,7 @@ namespace tessera {
 VolumeConfig VolumeConfig::ofPreset(const std::string& name) {
   VolumeConfig config;
   config.preset = name;
-  if (name == "cpu") return config;
-  if (name != "paper") throw Error("--set preset=" + name, "", "there is no such preset", "use cpu or paper");
+  if (!isPaperPreset(name)) return config;
   config.backgroundBlock = "border";
   config.voxels = 512;
   config.planes = 2048;
