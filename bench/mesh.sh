@@ -101,7 +101,7 @@ chained() {
     jq -r --arg edge "$edge" '"patches of \($edge) texels: model \(.model.psnr), faces seen \(.seen_faces.psnr), kept \(.kept_faces.psnr), " +
       "8 bits \(.texels_of_8_bits.psnr), opacities of 0 and 1 alone \(.["binarised_at_0.5"].psnr), " +
       "as stored, opaque from 0.8 \(.["opaque_from_0.8"].psnr) with \(.["opaque_from_0.8"].hits_per_ray) hits a ray, " +
-      "BC4 \(.bc4_fast.psnr), exhaustive \(.bc4_exhaustive.psnr) dB; \(.triangles) triangles, " +
+      "BC4 \(.bc4_fast.psnr), exhaustive \(.bc4_exhaustive.psnr // "not tried") dB; \(.triangles) triangles, " +
       "\(.texel_bytes_bc4 / 1e6) MB of texels in BC4; extraction \(.extraction_seconds) s, baking \(.bake_seconds) s"' "$file"
   done
 }
@@ -308,9 +308,10 @@ preset() {
       "LPIPS \($eval[0].lpips); \(.triangles) triangles, \(.bytes_on_disk / 1e6) MB on disk with an ordinary mesh"' \
       "$work/$name-$seed.bake.json"
   done <<< "final:
-cells-48:--set mesh_cells=48 --set patch_texels=12
-cells-96:--set mesh_cells=96
-texels-12:--set patch_texels=12
+texels-8:--set patch_texels=8
+texels-16:--set patch_texels=16
+cells-48:--set mesh_cells=48 --set patch_texels=16
+cells-96:--set mesh_cells=96 --set patch_texels=8
 table-16:--set grid_log2_size=16
 table-19:--set grid_log2_size=19
 hidden-2:--set hidden=2

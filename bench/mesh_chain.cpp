@@ -1,9 +1,10 @@
-// mesh_chain MODEL CAPTURE [PATCH_EDGE [TRIANGLES]]: what each step from a trained mesh to its baked contents loses.
-// Evaluates held-out photos with the model; with the faces that rays see; with those of them that extraction keeps;
-// with the triangles of all parts and their texels of 8 bits, traced by Embree; with opacities that are 0 or 1 alone;
-// with those that contents store; and with these after BC4 compression. At most TRIANGLES faces are kept, those that
-// contribute most. Prints PSNR, SSIM, hits per ray, and numbers of faces, patches and bytes as JSON; of the blocks also
-// the kept share of the faces in their boxes, and the kept faces for each cell in which there are some. See mesh.sh.
+// mesh_chain MODEL CAPTURE [PATCH_EDGE [TRIANGLES [MIN_OPACITY]]]: what each step from a trained mesh to its baked
+// contents loses. Evaluates held-out photos with the model; with the faces that rays see; with those of them that
+// extraction keeps; with the triangles of all parts and their texels of 8 bits, traced by Embree; with opacities that
+// are 0 or 1 alone; with those that contents store; and with these after BC4 compression. At most TRIANGLES faces are
+// kept, those that contribute most. MIN_OPACITY: of hits that count as seen (ExtractionSettings::minOpacity). Prints
+// PSNR, SSIM, hits per ray, and numbers of faces, patches and bytes as JSON; of the blocks also the kept share of the
+// faces in their boxes, and the kept faces for each cell in which there are some. See mesh.sh.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -173,7 +174,7 @@ struct BlockFaces {
 };
 
 nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& captureFolder, uint32_t patchEdge,
-                               size_t most) {
+                               size_t most, float minOpacity) {
   using Clock = std::chrono::steady_clock;
   const auto seconds = [](Clock::time_point since) {
     return std::chrono::duration<double>(Clock::now() - since).count();
@@ -195,6 +196,7 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
   std::vector<FaceSet> faces;
   for (const auto& part : mesh.parts) {
     ExtractionSettings settings;
+    settings.minOpacity = minOpacity;
     if (part->part().isBackground()) settings.raysPerCell = 0;
     faces.push_back(extractFaces(*part, 0, capture, nullptr, settings));
     result["faces_seen"].push_back(faces.back().count());
@@ -249,7 +251,9 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
     evaluateAs(snapping.name, patchesRenderer);
     result[snapping.name]["hits_per_ray"] = patchesRenderer.hitsPerRay();
     if (snapping.name != std::string("opaque_from_0.8") || patchEdge % 4 != 0) continue;
+    constexpr uint32_t kLargestExhaustive = 8;  // it takes minutes for each block, and longer with more texels
     for (const Bc4Effort effort : {Bc4Effort::fast, Bc4Effort::exhaustive}) {
+      if (effort == Bc4Effort::exhaustive && patchEdge > kLargestExhaustive) continue;
       std::vector<BakedPatches> compressed = contents;
       const auto compressing = Clock::now();
       for (BakedPatches& content : compressed) passThroughBc4(content, effort);
@@ -268,13 +272,15 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::fprintf(stderr, "usage: mesh_chain MODEL CAPTURE [PATCH_EDGE [TRIANGLES]]\n");
+    std::fprintf(stderr, "usage: mesh_chain MODEL CAPTURE [PATCH_EDGE [TRIANGLES [MIN_OPACITY]]]\n");
     return 2;
   }
   try {
     const uint32_t patchEdge = argc > 3 ? static_cast<uint32_t>(std::atoi(argv[3])) : 8;
     const size_t most = argc > 4 ? static_cast<size_t>(std::atoll(argv[4])) : SIZE_MAX;
-    std::printf("%s\n", tessera::measure(argv[1], argv[2], patchEdge, most).dump(2).c_str());
+    const float minOpacity =
+        argc > 5 ? static_cast<float>(std::atof(argv[5])) : tessera::ExtractionSettings{}.minOpacity;
+    std::printf("%s\n", tessera::measure(argv[1], argv[2], patchEdge, most, minOpacity).dump(2).c_str());
     return 0;
   } catch (const tessera::Error& error) {
     std::fprintf(stderr, "mesh_chain: error: %s\n", error.what());

@@ -23,6 +23,7 @@ inline MeshConfig smallMeshConfig() {
   config.learningRate = 2e-2;
   config.exposure = false;
   config.enoughPhotos = 0;
+  config.patchTexels = 8;
   return config;
 }
 

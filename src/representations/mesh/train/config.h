@@ -94,14 +94,14 @@ struct MeshConfig : BackgroundBlockSettings,
       "the final stage fits the coarser levels to the finest one; else, and without a final stage, their vertices are "
       "trained with it",
       anything());
-  SETTING(double, droppedShare, 0.005, "dropped_share",
+  SETTING(double, droppedShare, 0.0075, "dropped_share",
           "of what all triangles contribute to the rays of photos and those from above: the triangles with the least, "
           "which have this share together, are dropped",
           within(0, 0.5));
   SETTING(int, dilation, 0, "dilation",
           "how often the triangles beside those that rays see are added, if they are opaque enough, to close holes",
           within(0, 4));
-  SETTING(int, patchTexels, 8, "patch_texels", "texels along the edge of a patch of two triangles",
+  SETTING(int, patchTexels, 12, "patch_texels", "texels along the edge of a patch of two triangles",
           within(8, 32).withDivisor(4, 0));
 
   // Returns the settings of a preset; `paper` is meant for 80,000 steps. Throws Error if there is no preset of that
