@@ -69,10 +69,10 @@ struct MeshConfig : BackgroundBlockSettings,
           "what remains of a cell's occupancy after an update unless a ray reaches a hit in it", share());
   SETTING(double, vertexLearningRate, 8e-3, "vertex_learning_rate",
           "learning rate of the vertices, in edges of a cell; falls to a hundredth", atLeast(0));
-  SETTING(bool, coarseCells, true, "coarse_cells",
-          "training starts with the cells of a block in which photos see the coarse field; else with all, which takes "
-          "many times as long",
-          anything());
+  SETTING(
+      bool, coarseCells, true, "coarse_cells",
+      "training starts with the cells of a block in which photos see the coarse field; else with all, which is slower",
+      anything());
   SETTING(bool, surfaceStart, true, "surface_start",
           "vertices start where the coarse field has a surface in their cell; else in the middle of the cell",
           anything());

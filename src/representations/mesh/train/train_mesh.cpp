@@ -230,7 +230,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
 
   const Capture capture = addViewsBetween(config.leavesTransientsOut() ? applyTransientMasks(given, model) : given,
                                           model, viewSeed(config));
-  // With the views.
+  // The budget counts the views between the photos, too.
   config.photoBudgetMiB = resolvePhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
   // Vertices start at the surface only in blocks whose training begins now.
   const auto startsAtSurface = [&](const MeshPart& part) {
