@@ -179,6 +179,10 @@ class SurfaceTransfer final : public RayFollower {
       const float opacity = std::clamp(sum.weight / (sum.weight + sum.passed), kLeastOpacity, 1 - kLeastOpacity);
       texel[0] = std::min(texel[0], std::log(opacity / (1 - opacity)) - model_.opacityOffset());
     }
+    std::vector<bool> isKnown(sums.size());
+    for (size_t number = 0; number < sums.size(); ++number)
+      isKnown[number] = sums[number].weight > 0 || sums[number].passed > 0;
+    fillPatches(patchEdge_, std::move(isKnown), texels);
   }
 
  private:
@@ -197,6 +201,36 @@ class SurfaceTransfer final : public RayFollower {
 };
 
 }  // namespace
+
+void fillPatches(uint32_t edge, std::vector<bool> isKnown, std::vector<float>& texels) {
+  const int last = static_cast<int>(edge) - 1;
+  const size_t texelsOfPatch = size_t{edge} * edge;
+  for (size_t first = 0; first + texelsOfPatch <= isKnown.size(); first += texelsOfPatch) {
+    const auto at = [&](int column, int row) {
+      return first + static_cast<size_t>(row) * edge + static_cast<size_t>(column);
+    };
+    for (std::vector<size_t> filled(1); !filled.empty();) {
+      filled.clear();
+      for (int row = 0; row <= last; ++row) {
+        for (int column = 0; column <= last; ++column) {
+          if (isKnown[at(column, row)]) continue;
+          std::array<float, kFeatures> sum{};
+          float count = 0;
+          for (int j = std::max(0, row - 1); j <= std::min(last, row + 1); ++j)
+            for (int i = std::max(0, column - 1); i <= std::min(last, column + 1); ++i) {
+              if (!isKnown[at(i, j)]) continue;
+              ++count;
+              for (size_t f = 0; f < kFeatures; ++f) sum[f] += texels[kFeatures * at(i, j) + f];
+            }
+          if (count == 0) continue;
+          for (size_t f = 0; f < kFeatures; ++f) texels[kFeatures * at(column, row) + f] = sum[f] / count;
+          filled.push_back(at(column, row));
+        }
+      }
+      for (const size_t texel : filled) isKnown[texel] = true;
+    }
+  }
+}
 
 std::vector<float> fitVertices(const TriangleList& surface, const OctahedraGrid& grid,
                                std::vector<float> displacements) {

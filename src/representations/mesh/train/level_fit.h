@@ -15,6 +15,10 @@ namespace tessera {
 std::vector<float> fitVertices(const TriangleList& surface, const OctahedraGrid& grid,
                                std::vector<float> displacements);
 
+// Gives the texels of patches, [patches][edge][edge][kFeatures], that are not known the mean of their known neighbours
+// in the patch, and then those beside these, and so on. Patches of which no texel is known remain as they are.
+void fillPatches(uint32_t edge, std::vector<bool> isKnown, std::vector<float>& texels);
+
 struct FittedLevel {
   FaceSet faces;
   std::vector<float> texels;  // [TexelAtlas::texels()][MeshField::kFeatures]
@@ -23,8 +27,9 @@ struct FittedLevel {
 // Fits a coarse level of a block to the finest level, whose faces must be fixed (MeshModel::atlas). Rays of photos and
 // parallel rays are followed to the surfaces of the finest level, and from there to the nearest face of the coarse
 // level, up to a cell away. Texels get the mean of the features that rays see through them, and opacities that
-// decrease with the share of rays that pass them on the way to another face; texels without rays get the encoder's
-// output. `tiles`: as for extractFaces. Throws Error if a mask cannot be read.
+// decrease with the share of rays that pass them on the way to another face; texels without rays get those of their
+// neighbours, or the encoder's output in patches without rays. `tiles`: as for extractFaces. Throws Error if a mask
+// cannot be read.
 FittedLevel fitLevel(MeshModel& model, uint32_t level, const Capture& capture, const std::vector<TileShares>* tiles,
                      const ExtractionSettings& settings);
 

@@ -70,5 +70,32 @@ TEST(FitVertices, IgnoresTrianglesOutsideTheGridAndWithoutArea) {
   EXPECT_EQ(fitVertices(list, makeGrid(), kBefore), kBefore);
 }
 
+TEST(FillPatches, SpreadsKnownTexelsOverTheirPatchAlone) {
+  constexpr uint32_t kEdge = 8, kFeatures = MeshField::kFeatures;
+  constexpr size_t kTexels = size_t{kEdge} * kEdge;
+  std::vector<bool> isKnown(3 * kTexels);
+  std::vector<float> texels(3 * kTexels * kFeatures, -9);
+  const auto at = [&](size_t patch, uint32_t column, uint32_t row) -> float* {
+    return &texels[kFeatures * (patch * kTexels + row * kEdge + column)];
+  };
+  for (uint32_t f = 0; f < kFeatures; ++f) {
+    at(0, 0, 0)[f] = static_cast<float>(f);  // the only known texel of the first patch
+    for (uint32_t row = 0; row < kEdge; ++row) {
+      at(1, 0, row)[f] = 1;
+      at(1, 2, row)[f] = 4;
+    }
+  }
+  isKnown[0] = true;
+  for (uint32_t row = 0; row < kEdge; ++row) isKnown[kTexels + row * kEdge] = isKnown[kTexels + row * kEdge + 2] = true;
+  fillPatches(kEdge, isKnown, texels);
+  for (uint32_t row = 0; row < kEdge; ++row)
+    for (uint32_t column = 0; column < kEdge; ++column)
+      for (uint32_t f = 0; f < kFeatures; ++f) {
+        EXPECT_FLOAT_EQ(at(0, column, row)[f], static_cast<float>(f));
+        EXPECT_FLOAT_EQ(at(1, column, row)[f], column == 0 ? 1 : column == 1 ? 2.5f : 4);
+        EXPECT_EQ(at(2, column, row)[f], -9) << "nothing is known of this patch";
+      }
+}
+
 }  // namespace
 }  // namespace tessera
