@@ -29,7 +29,8 @@ void PhotoLoss::compare(const PhotoRays& rays, const Picture& picture, Slice<flo
   loss.rays = picture.finished;
   loss.predicted = exposed(picture);
   loss.target = rays.targets(picture.first, picture.count);
-  loss.weights = rays.weights(picture.first, picture.count);
+  loss.weights = picture.comparesTransparent ? rays.weights(picture.first, picture.count)
+                                             : rays.opaqueWeights(picture.first, picture.count);
   loss.loss = losses;
   loss.gradients = colourGradients(picture);
   device_.run(loss);

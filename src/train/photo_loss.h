@@ -26,6 +26,7 @@ class PhotoLoss {
     bool standsBeforeBackgrounds = true;  // composite over PhotoRays::backgrounds; else colours include a background
     float weight = 1;                     // of the colour loss
     bool trainsExposures = true;
+    bool comparesTransparent = true;  // else only the opaque pixels of photos are compared
   };
   static constexpr uint32_t kLosses = 2;  // the colour loss, and the sum of squared errors
 

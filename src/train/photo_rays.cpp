@@ -40,7 +40,7 @@ PhotoRays::PhotoRays(Device& device, const Capture& capture, const SceneFrame& f
       cameras_(device.uploadArray(rayCameras(capture, frame))),
       photoOfRay_(device.array<uint32_t>(settings.maxRays)) {
   const size_t rays = settings.maxRays;
-  for (Array<float>* one : {&weights_, &distances_, &nears_, &fars_}) *one = device.array<float>(rays);
+  for (Array<float>* one : {&weights_, &opaqueWeights_, &distances_, &nears_, &fars_}) *one = device.array<float>(rays);
   if (settings.nearFromSparseDepth) {
     for (const double depth : nearestSparseDepth(capture)) {
       nearOfPhoto_.push_back(static_cast<float>(kNearShare * depth * frame.scale));
@@ -64,6 +64,7 @@ void PhotoRays::draw(int64_t step, uint32_t rays, uint32_t square) {
   device_.write(targets_.all(), std::span<const float>(batch_.targets));
   device_.write(backgrounds_.all(), std::span<const float>(batch_.backgrounds));
   device_.write(weights_.all(), std::span<const float>(batch_.weights));
+  device_.write(opaqueWeights_.all(), std::span<const float>(batch_.opaqueWeights));
   device_.write(distances_.all(), std::span<const float>(batch_.distances));
   limitRays();
   std::vector<float> jitter;

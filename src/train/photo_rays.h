@@ -45,6 +45,7 @@ class PhotoRays {
   Slice<const float> targets(uint32_t first, uint32_t rays) const { return three(targets_, first, rays); }
   Slice<const float> backgrounds(uint32_t first, uint32_t rays) const { return three(backgrounds_, first, rays); }
   Slice<const float> weights(uint32_t first, uint32_t rays) const { return weights_.part(first, rays); }
+  Slice<const float> opaqueWeights(uint32_t first, uint32_t rays) const { return opaqueWeights_.part(first, rays); }
   Slice<const float> distances(uint32_t first, uint32_t rays) const { return distances_.part(first, rays); }
   // The distances at which rays start and end, scene units. With `sparseDepthMargin`, rays through a sparse point start
   // and end around it. With `nearFromSparseDepth`, other rays start at kNearShare of the nearest depth observed in
@@ -74,7 +75,8 @@ class PhotoRays {
   uint32_t count_ = 0;
   Array<RayCamera> cameras_;
   Array<uint32_t> photoOfRay_;
-  Array<float> pixels_, targets_, backgrounds_, weights_, jitter_, distances_, nears_, fars_, origins_, directions_;
+  Array<float> pixels_, targets_, backgrounds_, weights_, opaqueWeights_, jitter_, distances_, nears_, fars_, origins_,
+      directions_;
 };
 
 }  // namespace tessera

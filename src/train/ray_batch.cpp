@@ -70,6 +70,7 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
   batch.targets.resize(3 * size_t{rays});
   batch.backgrounds.resize(3 * size_t{rays});
   batch.weights.resize(rays);
+  batch.opaqueWeights.resize(rays);
   batch.jitter.resize(rays);
   batch.distances.assign(rays, 0.0f);
   std::optional<TileDraw> tiles;
@@ -134,6 +135,7 @@ void drawRays(const std::vector<PhotoWindow::Entry>& window, const std::vector<s
       batch.pixels[2 * ray + 1] = static_cast<float>(y) + 0.5f;
       const uint8_t* pixel = image.at(static_cast<int>(x), static_cast<int>(y));
       const float alpha = image.channels == 4 ? static_cast<float>(pixel[3]) / 255 : 1.0f;
+      batch.opaqueWeights[ray] = alpha < 1 ? 0.0f : batch.weights[ray];
       if (masked || alpha < 1) batch.distances[ray] = 0;  // the photo does not show the sparse point there
       for (int k = 0; k < 3; ++k) {
         const float value = static_cast<float>(pixel[image.channels >= 3 ? k : 0]) / 255;

@@ -15,6 +15,7 @@ struct RayBatch {
   std::vector<float> targets;        // [rays][3], sRGB in [0,1]; transparent photos over `backgrounds`
   std::vector<float> backgrounds;    // [rays][3]
   std::vector<float> weights;        // [rays], 0 for masked pixels, else 1
+  std::vector<float> opaqueWeights;  // [rays], as weights, but 0 also for pixels that are not opaque
   std::vector<float> jitter;         // [rays], in [0,1)
   std::vector<float> distances;      // [rays], sparse depth along the ray, scene units; 0: unknown
 };

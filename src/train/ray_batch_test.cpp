@@ -158,6 +158,8 @@ TEST(RayBatch, LaysTransparentPixelsOverTheBackground) {
   for (const int alpha : {0, 51, 255}) {
     const RayBatch batch = draw({entry(0, addressed(7, 5, 100, 4, static_cast<uint8_t>(alpha)))}, 1, 0, 200);
     const float opacity = static_cast<float>(alpha) / 255;
+    EXPECT_EQ(batch.weights, std::vector<float>(200, 1));
+    EXPECT_EQ(batch.opaqueWeights, std::vector<float>(200, alpha == 255 ? 1.0f : 0.0f));
     std::set<float> backgrounds;
     for (size_t ray = 0; ray < batch.weights.size(); ++ray) {
       const float behind = batch.backgrounds[3 * ray + 2];

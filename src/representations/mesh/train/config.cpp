@@ -19,7 +19,7 @@ MeshConfig MeshConfig::ofPreset(const std::string& name) {
   config.everyCell = true;
   config.coarseCells = config.surfaceStart = false;
   config.networkL2 = config.distortionWeight = config.throughShare = config.finalShare = config.droppedShare = 0;
-  config.exposure = false;
+  config.exposure = config.randomBackground = false;
   config.enoughPhotos = 0;
   config.patchTexels = 32;
   return config;

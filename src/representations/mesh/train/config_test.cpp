@@ -38,7 +38,12 @@ TEST(MeshConfig, HasThePapersSizesInThePaperPreset) {
   EXPECT_EQ(paper.domain(block, 0).grids[0].resolution, 128u);
   EXPECT_EQ(paper.domain(block, 4).grids[0].resolution, 8u);
   EXPECT_EQ(paper.stepsBeforeFinalStage(80000), 80000);
-  EXPECT_FALSE(paper.coarseCells);
+  EXPECT_FALSE(paper.coarseCells || paper.surfaceStart || paper.randomBackground || paper.exposure);
+  EXPECT_TRUE(paper.everyCell && paper.opaqueLoss);
+  EXPECT_EQ(paper.distortionWeight + paper.throughShare + paper.droppedShare + paper.networkL2, 0);
+  EXPECT_EQ(paper.backgroundBlock, "none");
+  EXPECT_EQ(paper.enoughPhotos, 0);
+  EXPECT_EQ(paper.transient, "none");
 }
 
 }  // namespace

@@ -38,6 +38,7 @@ MeshLevel::MeshLevel(Device& device, uint32_t number, OctahedraDomain domain, co
       occupancy_(device, occupancySpace(domain_)),
       tracedCells_(device.array<uint32_t>(domain_.grids.size() * domain_.grids[0].words())) {
   CHECK(displacements.size() == size_t{3} * domain_.grids[0].cells() * domain_.grids.size());
+  occupancy_.fill(1);  // so that a cell becomes empty only when no ray has reached it for many updates
   keepFaces({});
   updateTracedCells();
 }
@@ -145,7 +146,12 @@ void MeshLevel::addOccupancy(const MeshRays& rays, const MeshHits& hits, Matrix<
 void MeshLevel::refreshOccupancy(bool tracesNeighbours) {
   constexpr float kThreshold = 0.05f;
   tracesNeighbours_ = tracesNeighbours;
+  const std::vector<uint32_t> before = occupancy_.bitWords();
   occupancy_.update(settings_.occupancyDecay, kThreshold);
+  const std::vector<uint32_t> after = occupancy_.bitWords();
+  // While everything is equally transparent, no cell is above the mean. Without cells, there would be no more hits.
+  if (std::all_of(after.begin(), after.end(), [](uint32_t word) { return word == 0; }))
+    occupancy_.restore(occupancy_.values(), before);
   updateTracedCells();
 }
 
@@ -166,7 +172,7 @@ void MeshLevel::save(TensorSet& tensors, bool withMoments) {
 void MeshLevel::restore(const fs::path& path, const Safetensors& file) {
   loadGroup(device_, path, file, displacements_);
   for (const float displacement : device_.read(displacements_.values.all())) {
-    if (!(std::abs(displacement) <= kMaxDisplacement)) {
+    if (!(std::abs(displacement) < 0.5f)) {
       throw Error(path.string(), "tensor " + displacements_.name, "has a vertex outside of its cell",
                   "restore the file, or train again");
     }

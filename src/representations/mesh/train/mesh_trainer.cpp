@@ -15,7 +15,8 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kCapacityPerDemand = 2;                // for steps that need more than the last one
-constexpr uint32_t kMaxTrainingHits = 256;                // of a ray
+constexpr uint32_t kMaxFirstHits = 1024;                  // of a ray, before most cells are empty
+constexpr uint32_t kMaxTrainingHits = 256;                // of a ray, afterwards
 constexpr uint32_t kLosses = 2 * PhotoLoss::kLosses + 2;  // of a level: of both images, distortion, depth
 constexpr uint32_t kRaysPerCoarseRay = 4;
 // After one of this many updates of the occupancy, the neighbours of occupied cells are traced, too. Most hits would be
@@ -57,7 +58,7 @@ MeshTrainer::MeshTrainer(Device& device, const Capture& capture, const MeshConfi
   photoRays_.drawFrom(std::move(start.tiles));
   const uint32_t rays = static_cast<uint32_t>(config.maxRays);
   const uint32_t samples =  // at least one ray fits
-      std::max(kCapacityPerDemand * static_cast<uint32_t>(config.samplesPerStep), kMaxTrainingHits);
+      std::max(kCapacityPerDemand * static_cast<uint32_t>(config.samplesPerStep), kMaxFirstHits);
   hits_ = MeshHits(device, rays, samples);
   const size_t levels = config.levels();
   counters_ = device.array<uint32_t>((levels + 1) * MeshHits::kCounters);
@@ -84,6 +85,12 @@ void MeshTrainer::refreshOccupancy(int64_t step) {
     // Without hits of recent steps all cells would become empty, and none would be hit again.
     if (level == 0 || movesVertices(step)) model_.level(level).refreshOccupancy(explores);
   }
+}
+
+// What lies behind a ray's last hit is not trained, and becomes empty. Cells that no ray reaches do so at the latest
+// after about as many steps as there are before the first update.
+uint32_t MeshTrainer::maxHits(int64_t step) const {
+  return step < 2 * int64_t{config_.occupancyStartSteps} ? kMaxFirstHits : kMaxTrainingHits;
 }
 
 bool MeshTrainer::isFinalStage(int64_t step, int64_t plannedSteps) const {
@@ -155,7 +162,7 @@ void MeshTrainer::addGradients(uint32_t number, int64_t step, int64_t plannedSte
   MeshLevel& level = model_.level(number);
   hits_.counters = counters_.part(size_t{number} * MeshHits::kCounters, MeshHits::kCounters);
   const MeshRays traced{rays, photoRays_.origins(0, rays), directions, {}};
-  level.trace(traced, kMaxTrainingHits, false, hits_);
+  level.trace(traced, maxHits(step), false, hits_);
   const Count samples = hits_.samples();
   const MeshField::Output output =
       model_.field().forward(samples, hits_.positions, directions, hits_.rayOfSample, true);
@@ -268,7 +275,7 @@ void MeshTrainer::addOpaqueLoss(const Batch& batch, double weight, double thresh
   device_.run(opaque);
   PhotoLoss::Picture picture{finished, 0, batch.rays, opaqueColour_.part(0, size_t{3} * batch.rays),
                              opaqueOpacity_.part(0, batch.rays)};
-  picture.standsBeforeBackgrounds = false;
+  picture.standsBeforeBackgrounds = picture.comparesTransparent = false;  // this image is never transparent
   picture.weight = static_cast<float>(batch.mean * weight);
   picture.trainsExposures = false;
   photoLoss_.compare(photoRays_, picture, losses);
@@ -297,7 +304,7 @@ uint32_t MeshTrainer::addThroughGradients(int64_t step) {
   if (rays == 0) return 0;
   throughRays_->draw(step, rays);
   hits_.counters = counters_.part(counters_.size() - MeshHits::kCounters, MeshHits::kCounters);
-  model_.level(0).trace(throughRays_->rays(), kMaxTrainingHits, false, hits_);
+  model_.level(0).trace(throughRays_->rays(), maxHits(step), false, hits_);
   const Count samples = hits_.samples(), finished = hits_.finished(rays);
   model_.field().encodeForBackward(samples, hits_.positions);
 

@@ -31,6 +31,7 @@ class MeshTrainer final : public TrainableModel {
 
  private:
   bool movesVertices(int64_t step) const { return step >= config_.vertexStartSteps && config_.vertexLearningRate > 0; }
+  uint32_t maxHits(int64_t step) const;
   bool isFinalStage(int64_t step, int64_t plannedSteps) const;
   StepReport finalStep(int64_t step, int64_t plannedSteps);
   void refreshOccupancy(int64_t step);
