@@ -1,12 +1,16 @@
 #include "representations/mesh/bake/bake_mesh.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <limits>
 #include <numeric>
 
+#include "base/error.h"
 #include "compute/rows.h"
+#include "representations/mesh/content/mesh_payload.h"
 #include "representations/mesh/train/mesh_patches.h"
 
 namespace tessera {
@@ -198,8 +202,13 @@ BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces,
         baked.ranges[f].high = std::max(baked.ranges[f].high, texel.features[f]);
       }
     });
-  for (auto& range : baked.ranges)
+  for (auto& range : baked.ranges) {
     if (!(range.low <= range.high)) range = {0, 0};
+    if (range.low >= -kLargestMeshFeature && range.high <= kLargestMeshFeature) continue;
+    throw Error(model.part().name, "",
+                fmt::format("has features beyond {:g}, which no scene can hold", kLargestMeshFeature),
+                "train again with a lower --set learning_rate");
+  }
   if (!settings.texels) return baked;
   const size_t texels = patches.size() * settings.patchEdge * settings.patchEdge;
   baked.texels.reserve(texels * BakedPatches::kNumbers);

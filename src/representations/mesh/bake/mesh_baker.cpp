@@ -17,6 +17,7 @@
 #include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/content/mesh_payload.h"
 #include "representations/mesh/train/transient_masks.h"
+#include "representations/mesh/train/views_between.h"
 
 namespace tessera {
 namespace {
@@ -76,18 +77,20 @@ class MeshBaker final : public Baker {
 
   // Parts are in memory one after another, blocks row by row: of groups of blocks, only baked patches wait for others.
   void bake(const Capture& given, const BakeOptions& options, ContentSink& sink) override {
-    const Capture capture = applyTransientMasks(given, mesh_.folder());
     options_ = options;
     sink_ = &sink;
     placeOn(frame_, grid_);
-    frame_.georeference = capture.geo;
-    photosToCome_ = static_cast<int64_t>(capture.photosIn(Split::train).size());
+    frame_.georeference = given.geo;
     uint32_t levels = 1;
     for (const StoredMesh::Part& each : mesh_.parts()) levels = std::max(levels, each.levels);
     passes_ = 0;
     for (const StoredMesh::Part& each : mesh_.parts())
       for (uint32_t level = 0; level < (each.part.isBackground() ? 1 : levels); ++level)
         passes_ += isExtracted(each, level) ? 1 : 0;
+    Capture capture = applyTransientMasks(given, mesh_.folder());
+    if (passes_ > 0)  // triangles are what the photos of the training show
+      capture = addViewsBetween(std::move(capture), mesh_.folder(), static_cast<uint64_t>(mesh_.config().seed));
+    photosToCome_ = static_cast<int64_t>(capture.photosIn(Split::train).size());
     for (uint32_t level = 0; level < levels; ++level) beginLevel(level);
     for (int block = 0; block < mesh_.grid().cells(); ++block) bakeBlock(capture, block);
     if (const StoredMesh::Part* outside = findPart(-1)) bakeBackground(capture, *outside);
@@ -101,7 +104,8 @@ class MeshBaker final : public Baker {
     if (description().near > 1)
       throw Error(what, "", "the distance from cameras that has no triangles is longer than half a tile", remedy);
     constexpr int kMaxAlong = 4096;
-    constexpr int64_t kMaxTiles = 40000;  // of the finest level; coarser ones add a third
+    // Of the finest level; coarser ones add a third, and tileset.json must stay within its limits.
+    constexpr int64_t kMaxTiles = 7500;
     if (grid_.columns > kMaxAlong || grid_.rows > kMaxAlong || int64_t{grid_.columns} * grid_.rows > kMaxTiles) {
       throw Error(what, "", fmt::format("makes {} x {} tiles, more than a scene holds", grid_.columns, grid_.rows),
                   remedy);
@@ -345,7 +349,9 @@ class MeshBaker final : public Baker {
       summary.box.low = summary.box.low.cwiseMin(around.low);
       summary.box.high = summary.box.high.cwiseMax(around.high);
     }
-    summary.geometricError = texelEdge(level, content.isBackground);
+    // A coarser level may have finer texels than the finest one: with --texels below patch_texels.
+    for (uint32_t finer = 0; finer <= level; ++finer)
+      summary.geometricError = std::max(summary.geometricError, texelEdge(finer, content.isBackground));
     summary.memoryBytes = bytesInMemory(content);
     uint64_t patches = 0, textureBytes = 0;
     for (const PatchSet& part : content.parts) patches += part.patches;

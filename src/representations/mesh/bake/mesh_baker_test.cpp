@@ -13,6 +13,7 @@
 #include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/content/mesh_payload.h"
 #include "representations/mesh/cpu/mesh_drawer.h"
+#include "representations/mesh/testing/cube_training.h"
 #include "representations/mesh/testing/small_mesh.h"
 #include "representations/mesh/train/mesh_renderer.h"
 #include "representations/mesh/train/train_mesh.h"
@@ -204,6 +205,55 @@ TEST_F(BakeMeshScene, InfersTheTexturesThatItWouldStore) {
       EXPECT_EQ(a.depth.pixels, b.depth.pixels);
     }
   }
+}
+
+TEST_F(BakeMeshScene, ExtractsTheTrianglesOfModelsWithoutAFinalStage) {
+  const CubeScene scene;  // without walls
+  TrainMeshOptions options;
+  options.config = smallMeshConfig();
+  options.config.backgroundBlock = "none";
+  options.config.finalShare = 0;
+  options.config.coarseSteps = 300;
+  options.blocks = {false, 2, 1};
+  options.loop.steps = 300;
+  options.loop.progress = false;
+  options.loop.checkpointSeconds = 1e6;
+  ASSERT_TRUE(trainMesh(*device_, scene.capture(), scene / "model", options).finished);
+  const auto bakePlain = [&](const std::string& name, bool inferred) {
+    const auto baker =
+        makeMeshBaker(StoredMesh(*device_, scene / "model"), {.fallback = false, .inferredMaps = inferred});
+    return bakeScene(*baker, scene.capture(), *cube_ / name, {});
+  };
+  const BakedScene stored = bakePlain("plain_stored", false), inferred = bakePlain("plain_inferred", true);
+  ASSERT_EQ(stored.levels.size(), 2u);
+  EXPECT_TRUE(stored.tileset.coverage.empty());
+  EXPECT_EQ(inferred.tileset.resources.size(), 2u);
+  EXPECT_LT(stored.levels[1].counts[0].second, stored.levels[0].counts[0].second);
+  TrainedMesh mesh = loadTrainedMesh(*device_, scene / "model");
+  MeshRenderer renderer(mesh);
+  for (const int level : {0, 1}) {
+    const auto one = open("plain_stored", level), other = open("plain_inferred", level);
+    EXPECT_GT(compare(*one, renderer), level == 0 ? 22 : 17);
+    EXPECT_GT(heldOutPsnr(scene, *one), level == 0 ? 18 : 15);
+    EXPECT_GT(compare(*one, *other), 90) << "the same textures";
+  }
+}
+
+TEST_F(BakeMeshScene, MayHaveCoarserTexelsThanTheTraining) {
+  TrainMeshOptions options;
+  options.config = smallMeshConfig();
+  options.config.backgroundBlock = "none";
+  options.config.patchTexels = 16;
+  options.blocks = {false, 1, 1};
+  options.loop.steps = 40;
+  options.loop.progress = false;
+  options.loop.checkpointSeconds = 1e6;
+  const fs::path folder = *cube_ / "fine_texels";
+  ASSERT_TRUE(trainMesh(*device_, cube_->capture(), folder, options).finished);
+  const auto baker = makeMeshBaker(StoredMesh(*device_, folder), {.patchEdge = 8, .fallback = false});
+  const BakedScene baked = bakeScene(*baker, cube_->capture(), *cube_ / "coarse_texels", {});
+  ASSERT_EQ(baked.tileset.tiles.size(), 2u);
+  EXPECT_NO_THROW(open("coarse_texels"));
 }
 
 TEST_F(BakeMeshScene, IsNotDrawnWithoutItsEncoders) {

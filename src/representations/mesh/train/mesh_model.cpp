@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "base/random.h"
+#include "representations/mesh/content/mesh_payload.h"
 #include "representations/mesh/train/texel_atlas.h"
 
 namespace tessera {
@@ -102,7 +103,7 @@ std::vector<ParameterGroup*> MeshModel::sharedGroups() {
 
 std::unique_ptr<MeshLevel> MeshModel::makeLevel(uint32_t number, const std::vector<float>& displacements) {
   MeshLevel::Settings settings;
-  settings.near = static_cast<float>(config_.near);
+  settings.near = static_cast<float>(config_.near) * part_.halfBlockEdge;
   settings.minCosine = static_cast<float>(config_.minCosine);
   settings.opacityOffset = opacityOffset();
   settings.occupancyDecay = static_cast<float>(config_.occupancyDecay);
@@ -159,7 +160,11 @@ std::unique_ptr<MeshLevel> MeshModel::mergeLevel(uint32_t number, uint64_t seed)
   merge.opacities = opacities;
   merge.mergedDisplacements = merged;
   device_.run(merge);
-  std::unique_ptr<MeshLevel> level = makeLevel(number, device_.read(merged.all()));
+  // A vertex at its limit towards the outside of a child is nearer to the wall of the parent than vertices may be.
+  std::vector<float> displacements = device_.read(merged.all());
+  for (float& displacement : displacements)
+    displacement = std::clamp(displacement, -kMaxDisplacement, kMaxDisplacement);
+  std::unique_ptr<MeshLevel> level = makeLevel(number, displacements);
 
   // A cell may hold a surface if one of its children may.
   const std::vector<float> occupancy = finer.occupancy().values();
@@ -223,7 +228,7 @@ void MeshModel::restoreAtlas(const fs::path& path, const Safetensors& file) {
   bool isValid = edge.size() == 1 && edge[0] == static_cast<uint32_t>(config_.patchTexels) &&
                  ranges.size() == 2 * MeshField::kFeatures;
   for (size_t f = 0; isValid && f < ranges.size(); f += 2)
-    isValid = std::isfinite(ranges[f]) && std::isfinite(ranges[f + 1]) && ranges[f] <= ranges[f + 1];
+    isValid = ranges[f] >= -kLargestMeshFeature && ranges[f] <= ranges[f + 1] && ranges[f + 1] <= kLargestMeshFeature;
   if (!isValid) throwOtherSettings(path, "atlas.");
   MeshAtlas atlas;
   atlas.patchEdge = edge[0];

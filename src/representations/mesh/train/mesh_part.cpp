@@ -30,6 +30,7 @@ std::vector<MeshPart> makeMeshParts(const BlockGrid& grid, bool background) {
   part.frame = whole;
   part.frame.scale = 1 / half.maxCoeff();
   for (int axis = 0; axis < 3; ++axis) part.halfEdges[axis] = static_cast<float>(half[axis] * part.frame.scale);
+  part.halfBlockEdge = static_cast<float>(grid.edge / 2 * part.frame.scale);
   parts.push_back(part);
   return parts;
 }

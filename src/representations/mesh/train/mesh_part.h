@@ -19,6 +19,7 @@ struct MeshPart {
   int block = -1;    // number in the grid of blocks; -1: the background block
   SceneFrame frame;
   std::array<float, 3> halfEdges{};  // of the block, or of the region that it lies outside of
+  float halfBlockEdge = 1;           // for both kinds
 
   bool isBackground() const { return block < 0; }
 };

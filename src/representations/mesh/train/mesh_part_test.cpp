@@ -25,6 +25,7 @@ TEST(MeshParts, GiveEveryPointOfTheSceneToOnePart) {
   ASSERT_EQ(parts.size(), 7u);
   EXPECT_EQ(parts[3].name, "block_1_1");
   EXPECT_TRUE(parts[6].isBackground());
+  for (const MeshPart& part : parts) EXPECT_NEAR(part.halfBlockEdge / part.frame.scale, grid.edge / 2, 1e-5);
   EXPECT_EQ(makeMeshParts(grid, false).size(), 6u);
   std::vector<OctahedraDomain> domains;
   for (const MeshPart& part : parts) {

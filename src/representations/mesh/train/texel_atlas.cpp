@@ -36,7 +36,7 @@ void requireRoom(double texels, uint32_t patchEdge) {
   if (texels < kMaxTexels && texels * kBytesPerTexel < static_cast<double>(usableMemoryBytes())) return;
   throw Error(fmt::format("--set patch_texels={}", patchEdge), "",
               fmt::format("a part has {:.0f} million texels, more than fit the memory", texels / 1e6),
-              "use a lower number, or a lower --set mesh_cells");
+              "train into another folder with a lower number, a lower --set mesh_cells, or more --blocks");
 }
 
 }  // namespace

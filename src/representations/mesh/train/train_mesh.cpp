@@ -252,7 +252,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     const ModelFolder folder = partFolder(model, plan.part);
     if (!isRequested(plan.part.name)) continue;
     TrainingLoopOptions loop = options.loop;
-    loop.resume = folder.manifest().has_value();
+    loop.resume = run.goesOn || folder.manifest().has_value();  // also from a plan before the first checkpoint
     if (loop.minutes > 0) {
       const double left = run.goesOn || !options.only.empty()
                               ? (1 - config.coarseShare) * shareLeft * options.loop.minutes

@@ -86,6 +86,21 @@ TEST_F(TrainMesh, TrainsPartsAloneToTheSameBytes) {
   EXPECT_EQ(lastCheckpoints(scene / "apart"), lastCheckpoints(scene / "whole"));
 }
 
+TEST_F(TrainMesh, KeepsThePlanOfAPartThatHasNoCheckpointYet) {
+  TrainMeshOptions options = smallOptions();
+  options.loop.steps = 0;
+  options.loop.minutes = 0.05;
+  options.only = {"coarse"};
+  EXPECT_TRUE(train("mesh", options).finished);
+  const fs::path folder = scene / "mesh" / "parts" / "block_0_0";
+  fs::create_directories(folder);
+  ModelFolder(folder).writePlan({7, 3});
+  options.only = {"block_0_0"};
+  options.loop.resume = true;
+  EXPECT_TRUE(train("mesh", options).finished);
+  EXPECT_EQ(requireManifest(ModelFolder(folder)).step, 7);
+}
+
 TEST_F(TrainMesh, RecordsHowWellBlocksCoverWhatPhotosShow) {
   TrainMeshOptions options = smallOptions();
   options.only = {"coarse", "background", "block_1_0"};
