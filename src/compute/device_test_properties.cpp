@@ -9,6 +9,7 @@
 #include "compute/composite.h"
 #include "compute/device_test.h"
 #include "compute/occupancy.h"
+#include "compute/octahedra.h"
 #include "compute/rays.h"
 
 namespace tessera::device_test {
@@ -255,6 +256,39 @@ TEST_P(DeviceProperties, OccupancyForgetsWhatIsEmptyAndKeepsWhatIsFull) {
   // 0.95^n < 0.01 from n = 90 on; the mean stays above 0.01 until then.
   EXPECT_NEAR(lastChange, 89, 1);
   for (uint32_t cell = 0; cell < all; ++cell) EXPECT_EQ(before[cell / 32] >> cell % 32 & 1, cell % 8 < 2 ? 1u : 0u);
+}
+
+// Among transparent cells one opaque child at a time, at every place that it can have in its parent.
+TEST_P(DeviceProperties, CoarserOctahedraTakeTheVertexOfTheOpaqueChild) {
+  constexpr uint32_t kFine = 8, kCoarse = kFine / 2;
+  for (uint32_t child = 0; child < 8; ++child) {
+    Stage stage(*device, 81 + child);
+    const std::array<uint32_t, 3> parent = {1, 3, 2};
+    std::array<uint32_t, 3> cell{};
+    for (uint32_t axis = 0; axis < 3; ++axis) cell[axis] = 2 * parent[axis] + (child >> axis & 1);
+    const uint32_t planted = cell[0] + kFine * (cell[1] + kFine * cell[2]), cells = kFine * kFine * kFine;
+    std::vector<uint32_t> all(cells);
+    std::vector<float> logits(cells, -2), displacements(size_t{3} * cells);
+    for (uint32_t i = 0; i < cells; ++i) all[i] = i;
+    logits[planted] = 3;
+    for (float& displacement : displacements) displacement = stage.random.uniform(-0.45f, 0.45f);
+    MergeOctahedra merge;
+    merge.resolution = kFine;
+    merge.cells = stage.input(all);
+    merge.x = stage.makeMatrix(logits, 1, Layout::plain);
+    merge.displacements = stage.input(displacements);
+    merge.opacities = stage.output("opacities", cells);
+    merge.mergedDisplacements = stage.output("mergedDisplacements", size_t{3} * cells / 8);
+    device->run(merge);
+    const std::vector<float> merged = device->read(merge.mergedDisplacements);
+    const size_t at = parent[0] + kCoarse * (parent[1] + size_t{kCoarse} * parent[2]);
+    for (size_t axis = 0; axis < 3; ++axis) {
+      const double fine = cell[axis] + 0.5 + displacements[size_t{3} * planted + axis];
+      EXPECT_NEAR(2 * (static_cast<double>(parent[axis]) + 0.5 + merged[3 * at + axis]), fine, 1e-5)
+          << "child " << child << ", axis " << axis;
+    }
+    for (const float displacement : merged) EXPECT_LE(std::abs(displacement), 0.5f) << "within the cell";
+  }
 }
 
 TEST_P(DeviceProperties, AdamCountsTheStepsOfEachParameterAndLeavesTheUntouchedAlone) {
