@@ -3,8 +3,9 @@
 // extraction keeps; with the triangles of all parts and their texels of 8 bits, traced by Embree; with opacities that
 // are 0 or 1 alone; with those that contents store; and with these after BC4 compression. At most TRIANGLES faces are
 // kept, those that contribute most. MIN_OPACITY: of hits that count as seen (ExtractionSettings::minOpacity). Prints
-// PSNR, SSIM, hits per ray, and numbers of faces, patches and bytes as JSON; of the blocks also the kept share of the
-// faces in their boxes, and the kept faces for each cell in which there are some. See mesh.sh.
+// PSNR, SSIM, LPIPS (with the weights that LPIPS names), hits per ray, and numbers of faces, patches and bytes as JSON;
+// of the blocks also the kept share of the faces in their boxes, and the kept faces for each cell in which there are
+// some. See mesh.sh.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,6 +18,7 @@
 
 #include "base/error.h"
 #include "base/threads.h"
+#include "bench/evaluation.h"
 #include "compute/device.h"
 #include "eval/evaluate.h"
 #include "import/capture_reader.h"
@@ -185,8 +187,8 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
   MeshRenderer renderer(mesh);
   nlohmann::ordered_json result;
   const auto evaluateAs = [&](const char* name, ViewRenderer& source) {
-    const EvaluationReport report = evaluate(source, capture, {});
-    result[name] = {{"psnr", report.psnr}, {"ssim", report.ssim}};
+    const EvaluationReport report = evaluate(source, capture, optionsOfEnvironment());
+    result[name] = describeQuality(report);
     for (const ViewResult& view : report.views) result[name]["views"].push_back(view.psnr);
     std::fprintf(stderr, "%s: %.2f dB, SSIM %.3f\n", name, report.psnr, report.ssim);
   };
@@ -244,7 +246,8 @@ nlohmann::ordered_json measure(const fs::path& modelFolder, const fs::path& capt
       result["triangles"] = triangles;
       result["patches"] = patches;
       result["pairs"] = pairs;
-      result["texel_bytes_rgba"] = patches * patchEdge * patchEdge * BakedPatches::kNumbers;
+      constexpr uint64_t kNumbersOfRgba = (BakedPatches::kNumbers + 3) / 4 * 4;  // three textures of four numbers
+      result["texel_bytes_rgba"] = patches * patchEdge * patchEdge * kNumbersOfRgba;
       result["texel_bytes_bc4"] = patches * patchEdge * patchEdge * BakedPatches::kNumbers / 2;
     }
     PatchesRenderer patchesRenderer(mesh, contents);

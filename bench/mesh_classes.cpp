@@ -3,7 +3,8 @@
 // are cut out exactly, and wires are often thinner than a pixel, so a pixel that shows some of one may count as what is
 // behind it. With --binarised, opacities of texels are 1 from 0.5 on, and else 0, at all levels. Prints a JSON list
 // with an object for each scene: for all pixels, for those of surfaces and for each class the number of pixels, their
-// share, and the PSNR of their mean squared error, which is null where there are none. See mesh.sh.
+// share, and the PSNR of their mean squared error, which is null where there are none; and SSIM and LPIPS of the photos
+// (the latter with the weights that LPIPS names). See mesh.sh.
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "base/error.h"
+#include "bench/evaluation.h"
 #include "bench/mesh_scene.h"
 #include "bench/synthetic_city.h"
 #include "eval/evaluate.h"
@@ -83,7 +85,7 @@ nlohmann::ordered_json judge(const fs::path& folder, const Capture& capture, boo
   const OpenedMeshScene scene =
       openMeshScene(folder, binarised ? std::make_unique<BinarisingDrawer>() : makeMeshDrawer());
   std::array<ClassError, kClasses> errors;
-  EvaluateOptions options;
+  EvaluateOptions options = optionsOfEnvironment();
   options.onView = [&](const ViewResult& view, const ViewPictures& pictures) {
     const std::vector<int>& classes = classesOfPhotos.at(view.name);
     for (size_t pixel = 0; pixel < classes.size(); ++pixel) {
@@ -96,13 +98,14 @@ nlohmann::ordered_json judge(const fs::path& folder, const Capture& capture, boo
       errors[classes[pixel]].add(error);
     }
   };
-  evaluate(*scene.renderer, capture, options);
+  const EvaluationReport report = evaluate(*scene.renderer, capture, options);
   ClassError surfaces;
   for (int i = 0; i < kSurfaceClasses; ++i) surfaces.add(errors[i]);
   ClassError all = surfaces;
   all.add(errors[kSky]);
   nlohmann::ordered_json result = {{"scene", folder.filename().string()},
                                    {"binarised", binarised},
+                                   {"photos", describeQuality(report)},
                                    {"all", all.describe(all.pixels)},
                                    {"surfaces", surfaces.describe(all.pixels)}};
   for (int i = 0; i < kClasses; ++i) result[kClassNames[i]] = errors[i].describe(all.pixels);

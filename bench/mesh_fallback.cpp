@@ -13,13 +13,17 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "base/threads.h"
 #include "bench/mesh_scene.h"
+#include "eval/lpips.h"
 #include "eval/psnr.h"
 #include "eval/ssim.h"
 #include "import/capture_reader.h"
@@ -284,6 +288,9 @@ Json compare(const fs::path& folder, const fs::path& captureFolder, const fs::pa
   SceneRenderer& oracle = *scene.renderer;
   Json sums = Json::object();
   uint64_t views = 0;
+  const char* weights = std::getenv("LPIPS");
+  const std::optional<Lpips> lpips = weights != nullptr ? std::optional<Lpips>(weights) : std::nullopt;
+  ThreadPool pool(0);
   for (const Photo& photo : heldOutPhotos(capture, tileset)) {
     const Camera& camera = capture.cameras[photo.camera];
     const Pose& pose = photo.worldFromCamera;
@@ -306,14 +313,15 @@ Json compare(const fs::path& folder, const fs::path& captureFolder, const fs::pa
         if (sum.is_null()) sum = {{"psnr", 0.0}, {"ssim", 0.0}};
         sum["psnr"] = sum["psnr"].get<double>() + decibels;
         sum["ssim"] = sum["ssim"].get<double>() + ssim(images[a].second, images[b].second);
+        if (lpips) sum["lpips"] = sum.value("lpips", 0.0) + (*lpips)(images[a].second, images[b].second, pool).total;
         sum["views"].push_back(decibels);
       }
     ++views;
   }
   for (auto& [a, others] : sums.items())
     for (auto& [b, sum] : others.items())
-      for (const char* key : {"psnr", "ssim"})
-        sum[key] = sum[key].get<double>() / static_cast<double>(sum["views"].size());
+      for (const char* key : {"psnr", "ssim", "lpips"})
+        if (sum.contains(key)) sum[key] = sum[key].get<double>() / static_cast<double>(sum["views"].size());
   sums["views"] = views;
   return sums;
 }

@@ -20,6 +20,7 @@
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "bench/evaluation.h"
 #include "bench/mesh_scene.h"
 #include "bench/synthetic_city.h"
 #include "eval/evaluate.h"
@@ -367,7 +368,7 @@ class TexturedCity final : public ViewRenderer {
 nlohmann::ordered_json judge(ViewRenderer& renderer, const Capture& capture, const TileFrame& frame,
                              const fs::path& imagesDir) {
   std::vector<double> inBox;
-  EvaluateOptions options;
+  EvaluateOptions options = optionsOfEnvironment();
   options.imagesDir = imagesDir;
   options.onView = [&](const ViewResult& result, const ViewPictures& pictures) {
     const auto photo = std::find_if(capture.photos.begin(), capture.photos.end(),
@@ -388,7 +389,7 @@ nlohmann::ordered_json judge(ViewRenderer& renderer, const Capture& capture, con
     if (std::isfinite(decibels)) inBox.push_back(decibels);
   };
   const EvaluationReport report = evaluate(renderer, capture, options);
-  nlohmann::ordered_json result = {{"psnr", report.psnr}, {"ssim", report.ssim}};
+  nlohmann::ordered_json result = describeQuality(report);
   result["psnr_in_box"] = std::accumulate(inBox.begin(), inBox.end(), 0.0) / static_cast<double>(inBox.size());
   for (const ViewResult& view : report.views) result["views"].push_back(view.psnr);
   return result;
