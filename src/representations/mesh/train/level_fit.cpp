@@ -179,10 +179,11 @@ class SurfaceTransfer final : public RayFollower {
       const float opacity = std::clamp(sum.weight / (sum.weight + sum.passed), kLeastOpacity, 1 - kLeastOpacity);
       texel[0] = std::min(texel[0], std::log(opacity / (1 - opacity)) - model_.opacityOffset());
     }
-    std::vector<bool> isKnown(sums.size());
-    for (size_t number = 0; number < sums.size(); ++number)
-      isKnown[number] = sums[number].weight > 0 || sums[number].passed > 0;
-    fillPatches(patchEdge_, std::move(isKnown), texels);
+    std::vector<KnownTexel> known;
+    for (const FaceTexels::Texel& sum : sums) {
+      known.push_back(sum.weight > 0 ? KnownTexel::seen : sum.passed > 0 ? KnownTexel::passed : KnownTexel::unseen);
+    }
+    fillPatches(patchEdge_, std::move(known), texels);
   }
 
  private:
@@ -202,10 +203,10 @@ class SurfaceTransfer final : public RayFollower {
 
 }  // namespace
 
-void fillPatches(uint32_t edge, std::vector<bool> isKnown, std::vector<float>& texels) {
+void fillPatches(uint32_t edge, std::vector<KnownTexel> known, std::vector<float>& texels) {
   const int last = static_cast<int>(edge) - 1;
   const size_t texelsOfPatch = size_t{edge} * edge;
-  for (size_t first = 0; first + texelsOfPatch <= isKnown.size(); first += texelsOfPatch) {
+  for (size_t first = 0; first + texelsOfPatch <= known.size(); first += texelsOfPatch) {
     const auto at = [&](int column, int row) {
       return first + static_cast<size_t>(row) * edge + static_cast<size_t>(column);
     };
@@ -213,12 +214,12 @@ void fillPatches(uint32_t edge, std::vector<bool> isKnown, std::vector<float>& t
       filled.clear();
       for (int row = 0; row <= last; ++row) {
         for (int column = 0; column <= last; ++column) {
-          if (isKnown[at(column, row)]) continue;
+          if (known[at(column, row)] != KnownTexel::unseen) continue;
           std::array<float, kFeatures> sum{};
           float count = 0;
           for (int j = std::max(0, row - 1); j <= std::min(last, row + 1); ++j)
             for (int i = std::max(0, column - 1); i <= std::min(last, column + 1); ++i) {
-              if (!isKnown[at(i, j)]) continue;
+              if (known[at(i, j)] != KnownTexel::seen) continue;
               ++count;
               for (size_t f = 0; f < kFeatures; ++f) sum[f] += texels[kFeatures * at(i, j) + f];
             }
@@ -227,7 +228,7 @@ void fillPatches(uint32_t edge, std::vector<bool> isKnown, std::vector<float>& t
           filled.push_back(at(column, row));
         }
       }
-      for (const size_t texel : filled) isKnown[texel] = true;
+      for (const size_t texel : filled) known[texel] = KnownTexel::seen;
     }
   }
 }

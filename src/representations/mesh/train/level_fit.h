@@ -15,9 +15,11 @@ namespace tessera {
 std::vector<float> fitVertices(const TriangleList& surface, const OctahedraGrid& grid,
                                std::vector<float> displacements);
 
-// Gives the texels of patches, [patches][edge][edge][kFeatures], that are not known the mean of their known neighbours
-// in the patch, and then those beside these, and so on. Patches of which no texel is known remain as they are.
-void fillPatches(uint32_t edge, std::vector<bool> isKnown, std::vector<float>& texels);
+// What is known of a texel: nothing; its features; or that rays pass it, which says nothing about those beside it.
+enum class KnownTexel : uint8_t { unseen, seen, passed };
+// Gives the unseen texels of patches, [patches][edge][edge][kFeatures], the mean of their seen neighbours in the patch,
+// and then those beside these, and so on. Patches of which no texel is seen remain as they are.
+void fillPatches(uint32_t edge, std::vector<KnownTexel> known, std::vector<float>& texels);
 
 struct FittedLevel {
   FaceSet faces;

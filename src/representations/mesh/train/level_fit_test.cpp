@@ -73,7 +73,7 @@ TEST(FitVertices, IgnoresTrianglesOutsideTheGridAndWithoutArea) {
 TEST(FillPatches, SpreadsKnownTexelsOverTheirPatchAlone) {
   constexpr uint32_t kEdge = 8, kFeatures = MeshField::kFeatures;
   constexpr size_t kTexels = size_t{kEdge} * kEdge;
-  std::vector<bool> isKnown(3 * kTexels);
+  std::vector<KnownTexel> known(3 * kTexels, KnownTexel::unseen);
   std::vector<float> texels(3 * kTexels * kFeatures, -9);
   const auto at = [&](size_t patch, uint32_t column, uint32_t row) -> float* {
     return &texels[kFeatures * (patch * kTexels + row * kEdge + column)];
@@ -85,15 +85,17 @@ TEST(FillPatches, SpreadsKnownTexelsOverTheirPatchAlone) {
       at(1, 2, row)[f] = 4;
     }
   }
-  isKnown[0] = true;
-  for (uint32_t row = 0; row < kEdge; ++row) isKnown[kTexels + row * kEdge] = isKnown[kTexels + row * kEdge + 2] = true;
-  fillPatches(kEdge, isKnown, texels);
+  known[0] = KnownTexel::seen;
+  for (uint32_t row = 0; row < kEdge; ++row)
+    known[kTexels + row * kEdge] = known[kTexels + row * kEdge + 2] = KnownTexel::seen;
+  known[1] = known[2 * kTexels] = KnownTexel::passed;
+  fillPatches(kEdge, known, texels);
   for (uint32_t row = 0; row < kEdge; ++row)
     for (uint32_t column = 0; column < kEdge; ++column)
       for (uint32_t f = 0; f < kFeatures; ++f) {
-        EXPECT_FLOAT_EQ(at(0, column, row)[f], static_cast<float>(f));
+        EXPECT_FLOAT_EQ(at(0, column, row)[f], column == 1 && row == 0 ? -9 : static_cast<float>(f)) << "or passed";
         EXPECT_FLOAT_EQ(at(1, column, row)[f], column == 0 ? 1 : column == 1 ? 2.5f : 4);
-        EXPECT_EQ(at(2, column, row)[f], -9) << "nothing is known of this patch";
+        EXPECT_EQ(at(2, column, row)[f], -9) << "nothing is seen of this patch";
       }
 }
 
