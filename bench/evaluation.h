@@ -8,10 +8,16 @@
 
 namespace tessera {
 
-// With LPIPS if the environment variable of that name contains the path of its weights.
+// The path of the weights, which the environment variable LPIPS contains; empty without it.
+inline fs::path lpipsWeights() {
+  const char* const weights = std::getenv("LPIPS");
+  return weights != nullptr ? weights : "";
+}
+
+// With LPIPS if there are weights.
 inline EvaluateOptions optionsOfEnvironment() {
   EvaluateOptions options;
-  if (const char* weights = std::getenv("LPIPS")) options.lpipsWeights = weights;
+  options.lpipsWeights = lpipsWeights();
   return options;
 }
 

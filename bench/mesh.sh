@@ -99,13 +99,11 @@ chained() {
       "$(shortfall "$(jq .kept_faces.psnr "$file")" "$(jq .texels_of_8_bits.psnr "$file")")" '<=' 0.35
     verdict "$1, loss by BC4 in dB" \
       "$(shortfall "$(jq '.["opaque_from_0.8"].psnr' "$file")" "$(jq .bc4_fast.psnr "$file")")" '<=' 0.1
-    verdict "$1, memory of texels in BC4 relative to three RGBA8 textures" \
-      "$(jq '.texel_bytes_bc4 / .texel_bytes_rgba' "$file")" '<=' 0.375
     jq -r --arg edge "$edge" '"patches of \($edge) texels: model \(.model.psnr), faces seen \(.seen_faces.psnr), kept \(.kept_faces.psnr), " +
       "8 bits \(.texels_of_8_bits.psnr), opacities of 0 and 1 alone \(.["binarised_at_0.5"].psnr), " +
       "as stored, opaque from 0.8 \(.["opaque_from_0.8"].psnr) with \(.["opaque_from_0.8"].hits_per_ray) hits a ray, " +
       "BC4 \(.bc4_fast.psnr), exhaustive \(.bc4_exhaustive.psnr // "not tried") dB; \(.triangles) triangles, " +
-      "\(.texel_bytes_bc4 / 1e6) MB of texels in BC4; extraction \(.extraction_seconds) s, baking \(.bake_seconds) s"' "$file"
+      "\(.texel_bytes_bc4 / 1e6) MB of texels in BC4, \(.texel_bytes_rgba / 1e6) MB in three RGBA8 textures; extraction \(.extraction_seconds) s, baking \(.bake_seconds) s"' "$file"
   done
 }
 
@@ -403,7 +401,7 @@ borders() {
 }
 
 # What does not scale with the number of steps, for trainings of a few hundred: vertices move, and cells become empty.
-short_schedule=(--set vertex_start_steps=20 --set occupancy_start_steps=32 --set occupancy_every=8)
+short_schedule=(--set vertex_start_steps=20 --set occupancy_start_steps=16 --set occupancy_every=4)
 
 # Small trainings whose bytes are compared.
 tiny_flags=(--method mesh --steps 120 --seed 7 --blocks 2x2 --set coarse_steps=60 --set samples_per_step=8192
@@ -470,12 +468,13 @@ killed() {
   while [ "$kills" -lt 10 ] || [ "$inFinalStage" -eq 0 ]; do
     if interrupted train "$work/tiny" "$work/tiny-killed" "${tiny_flags[@]}" --resume --checkpoint-seconds 0.3; then
       kills=$((kills + 1))
-      steps=$(cat "$work"/tiny-killed/parts/*/manifest.json 2> /dev/null | jq -s -c 'map(.step)')
-      [ "$(jq 'any(.[]; . > 96 and . < 120)' <<< "${steps:-[]}")" = false ] || inFinalStage=$((inFinalStage + 1))
+      steps=$({ cat "$work"/tiny-killed/parts/*/manifest.json 2> /dev/null || true; } | jq -s -c 'map(.step)')
+      [ "$(jq 'any(.[]; . > 96 and . < 120)' <<< "$steps")" = false ] || inFinalStage=$((inFinalStage + 1))
       echo "kill $kills; steps of parts: $steps; $(tail -n 1 "$work/interrupted.log" | tr '\r' '\n' | tail -n 1)"
     else
       rm -rf "$work/tiny-killed"
     fi
+    [ "$kills" -lt 60 ] || die "none of 60 kills was in the final stage"
   done
   tiny tiny-killed --resume
   echo "$inFinalStage of $kills kills in the final stage, which begins with the extraction"

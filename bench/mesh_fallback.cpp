@@ -13,7 +13,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -22,6 +21,7 @@
 #include "base/error.h"
 #include "base/image_io.h"
 #include "base/threads.h"
+#include "bench/evaluation.h"
 #include "bench/mesh_scene.h"
 #include "eval/lpips.h"
 #include "eval/psnr.h"
@@ -288,8 +288,8 @@ Json compare(const fs::path& folder, const fs::path& captureFolder, const fs::pa
   SceneRenderer& oracle = *scene.renderer;
   Json sums = Json::object();
   uint64_t views = 0;
-  const char* weights = std::getenv("LPIPS");
-  const std::optional<Lpips> lpips = weights != nullptr ? std::optional<Lpips>(weights) : std::nullopt;
+  std::optional<Lpips> lpips;
+  if (!lpipsWeights().empty()) lpips.emplace(lpipsWeights());
   ThreadPool pool(0);
   for (const Photo& photo : heldOutPhotos(capture, tileset)) {
     const Camera& camera = capture.cameras[photo.camera];
