@@ -129,7 +129,7 @@ TEST_F(MeshCommandLine, RejectsOptionsThatItDoesNotSupport) {
   refuses(train("nothing", {"--steps", "3", "--set", "background_block=learned"}), "background_block");
   EXPECT_FALSE(fs::exists(folder_ / "nothing/manifest.json"));
   ASSERT_EQ(train("few", {"--steps", "4", "--only-blocks", "coarse"}).exitCode, 0);
-  refuses(run({"bake", at("few"), at("no.scene")}), "few");
+  refuses(run({"bake", at("few"), at("no.scene")}), "none has been trained yet");
   refuses(run({"bake", at("few"), at("no.scene"), "--texels", "4"}), "--texels 4");
   refuses(run({"bake", at("few"), at("no.scene"), "--tiles-per-block", "3"}), "--tiles-per-block 3");
   refuses(run({"bake", at("few"), at("no.scene"), "--maps", "guessed"}), "stored");

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "train/photo_loss.h"
 #include "train/testing/cube_scene.h"
 
 namespace tessera {
@@ -103,6 +104,32 @@ TEST(PhotoRays, BeginAndEndAroundTheirSparsePoint) {
     }
   }
   EXPECT_NEAR(known, kRays / 2, 150);
+}
+
+TEST(PhotoLoss, LeavesTransparentPixelsOutOnRequest) {
+  const CubeScene scene;  // photos are transparent around the cube
+  const std::unique_ptr<Device> device = makeDevice({"cpu", 1});
+  PhotoRays rays(*device, scene.capture(), SceneFrame(), {});
+  constexpr uint32_t kSome = 500;
+  rays.draw(0, kSome);
+  PhotoLoss loss(*device, scene.capture(), PhotoLossSettings(), kSome);
+  Array<float> losses = device->array<float>(PhotoLoss::kLosses), opacities = device->array<float>(kSome);
+  const Array<float> colours = device->uploadArray(std::vector<float>(3 * kSome, 2.0f));  // unlike any photo
+  PhotoLoss::Picture picture{{kSome}, 0, kSome, colours, opacities};
+  picture.standsBeforeBackgrounds = false;
+  for (const bool all : {true, false}) {
+    picture.comparesTransparent = all;
+    loss.compare(rays, picture, losses);
+    const std::vector<float> gradients = device->read(loss.colourGradients(picture));
+    uint32_t transparent = 0;
+    for (uint32_t ray = 0; ray < kSome; ++ray) {
+      const bool isOpaque = rays.batch().opaqueWeights[ray] > 0;
+      transparent += isOpaque ? 0 : 1;
+      EXPECT_EQ(gradients[3 * ray] > 0, all || isOpaque) << ray;
+    }
+    EXPECT_GT(transparent, kSome / 10);
+    EXPECT_LT(transparent, kSome * 9 / 10);
+  }
 }
 
 }  // namespace

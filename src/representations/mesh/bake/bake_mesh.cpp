@@ -207,7 +207,7 @@ BakedPatches bakePatches(MeshModel& model, uint32_t level, const FaceSet& faces,
     if (range.low >= -kLargestMeshFeature && range.high <= kLargestMeshFeature) continue;
     throw Error(model.part().name, "",
                 fmt::format("has features beyond {:g}, which no scene can hold", kLargestMeshFeature),
-                "train again with a lower --set learning_rate");
+                "train again, into another folder, with a lower --set learning_rate");
   }
   if (!settings.texels) return baked;
   const size_t texels = patches.size() * settings.patchEdge * settings.patchEdge;

@@ -99,13 +99,14 @@ class MeshBaker final : public Baker {
  private:
   // Throws Error for what would be refused when the scene is written, after everything has been baked.
   void requireValidGrid() const {
-    const std::string remedy = "bake with a lower --tiles-per-block";
+    const std::string remedy =
+        tilesPerBlock_ > 1 ? "bake with a lower --tiles-per-block" : "train with fewer and larger --blocks";
     const std::string what = fmt::format("--tiles-per-block {}", tilesPerBlock_);
     if (description().near > 1)
       throw Error(what, "", "the distance from cameras that has no triangles is longer than half a tile", remedy);
     constexpr int kMaxAlong = 4096;
     // Of the finest level; coarser ones add a third, and tileset.json must stay within its limits.
-    constexpr int64_t kMaxTiles = 7500;
+    constexpr int64_t kMaxTiles = 5000;
     if (grid_.columns > kMaxAlong || grid_.rows > kMaxAlong || int64_t{grid_.columns} * grid_.rows > kMaxTiles) {
       throw Error(what, "", fmt::format("makes {} x {} tiles, more than a scene holds", grid_.columns, grid_.rows),
                   remedy);

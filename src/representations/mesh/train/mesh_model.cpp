@@ -228,8 +228,13 @@ void MeshModel::restoreAtlas(const fs::path& path, const Safetensors& file) {
   bool isValid = edge.size() == 1 && edge[0] == static_cast<uint32_t>(config_.patchTexels) &&
                  ranges.size() == 2 * MeshField::kFeatures;
   for (size_t f = 0; isValid && f < ranges.size(); f += 2)
-    isValid = ranges[f] >= -kLargestMeshFeature && ranges[f] <= ranges[f + 1] && ranges[f + 1] <= kLargestMeshFeature;
+    isValid = std::isfinite(ranges[f]) && std::isfinite(ranges[f + 1]) && ranges[f] <= ranges[f + 1];
   if (!isValid) throwOtherSettings(path, "atlas.");
+  for (const float range : ranges) {
+    if (std::abs(range) <= kLargestMeshFeature) continue;
+    throw Error(path.string(), "tensor atlas.ranges", "has features beyond what a scene can hold",
+                "train again, into another folder, with a lower --set learning_rate");
+  }
   MeshAtlas atlas;
   atlas.patchEdge = edge[0];
   atlas.faces = restoreFaces(path, file, "atlas.", level(0).domain());

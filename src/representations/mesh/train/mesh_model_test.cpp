@@ -53,6 +53,30 @@ TEST(MeshModel, RefusesDamagedNumbers) {
   EXPECT_NE(messageWith(table, INFINITY).find("not finite"), std::string::npos);
 }
 
+TEST(MeshModel, RefusesFeaturesThatNoSceneCanHold) {
+  const auto device = makeDevice({"cpu", 1});
+  const MeshPart part{"block_0_0", 0, {}, {1, 1, 1}};
+  const auto isRead = [&](float largest) {
+    MeshModel model(*device, smallMeshConfig(), part), again(*device, smallMeshConfig(), part);
+    MeshAtlas atlas;
+    atlas.patchEdge = 8;
+    atlas.faces = FaceSet(model.level(0).domain().grids);
+    for (int f = 0; f < MeshField::kFeatures; ++f) atlas.ranges.insert(atlas.ranges.end(), {-largest, largest});
+    model.setAtlas(std::move(atlas));
+    TensorSet tensors;
+    model.save(tensors, true);
+    try {
+      again.restore("state", *decodeSafetensors(tensors.encode({})));
+    } catch (const Error& error) {
+      EXPECT_NE(std::string(error.what()).find("beyond what a scene can hold"), std::string::npos) << error.what();
+      return false;
+    }
+    return true;
+  };
+  EXPECT_TRUE(isRead(1e6f));
+  EXPECT_FALSE(isRead(1.1e6f));
+}
+
 TEST(MeshModel, HasOnlyQuadsIfRequested) {
   const auto device = makeDevice({"cpu", 1});
   MeshConfig config = smallMeshConfig();
@@ -258,6 +282,25 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
   EXPECT_EQ(level.occupancy().bitWords(), expected);
   level.trace(rays, kMaxHits, false, hits);
   EXPECT_LT(device->read(counters.all())[0], all / 2) << "hits beyond the surface and its neighbours";
+}
+
+TEST(MeshModel, BeginsRaysAtADistanceInHalvesOfABlock) {
+  const auto device = makeDevice({"cpu", 1});
+  MeshConfig config = smallMeshConfig();
+  config.near = 2;
+  MeshPart part{"block_0_0", 0, {}, {1, 1, 1}};
+  part.halfBlockEdge = 0.25f;  // as of the background block of four blocks in a row
+  MeshModel model(*device, config, part);
+  const Array<float> origins = device->uploadArray(std::vector<float>{0.07f, 0.05f, 0.9f}),
+                     directions = device->uploadArray(std::vector<float>{0, 0, -1});
+  MeshHits hits(*device, 1, 200);
+  Array<uint32_t> counters = device->array<uint32_t>(MeshHits::kCounters);
+  hits.counters = counters;
+  model.level(0).trace({1, origins, directions, {}}, 200, false, hits);
+  ASSERT_GT(device->read(counters.all())[0], 5u);
+  const float first = device->read(hits.distances.part(0, 1))[0];
+  EXPECT_GE(first, 0.5f);
+  EXPECT_LT(first, 0.7f);
 }
 
 TEST(MeshModel, KeepsItsCellsWhileAllAreEquallyTransparent) {

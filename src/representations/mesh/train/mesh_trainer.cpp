@@ -87,10 +87,11 @@ void MeshTrainer::refreshOccupancy(int64_t step) {
   }
 }
 
-// What lies behind a ray's last hit is not trained, and becomes empty. Cells that no ray reaches do so at the latest
-// after about as many steps as there are before the first update.
+// What lies behind a ray's last hit is not trained, and becomes empty. With the default decay, cells that no ray
+// reaches do so in the 14th update.
 uint32_t MeshTrainer::maxHits(int64_t step) const {
-  return step < 2 * int64_t{config_.occupancyStartSteps} ? kMaxFirstHits : kMaxTrainingHits;
+  constexpr int64_t kUpdates = 16;
+  return step < config_.occupancyStartSteps + kUpdates * config_.occupancyEvery ? kMaxFirstHits : kMaxTrainingHits;
 }
 
 bool MeshTrainer::isFinalStage(int64_t step, int64_t plannedSteps) const {
@@ -275,7 +276,7 @@ void MeshTrainer::addOpaqueLoss(const Batch& batch, double weight, double thresh
   device_.run(opaque);
   PhotoLoss::Picture picture{finished, 0, batch.rays, opaqueColour_.part(0, size_t{3} * batch.rays),
                              opaqueOpacity_.part(0, batch.rays)};
-  picture.standsBeforeBackgrounds = picture.comparesTransparent = false;  // this image is never transparent
+  picture.standsBeforeBackgrounds = picture.comparesTransparent = false;  // its colours are normalised
   picture.weight = static_cast<float>(batch.mean * weight);
   picture.trainsExposures = false;
   photoLoss_.compare(photoRays_, picture, losses);

@@ -117,13 +117,14 @@ bool trainCoarseField(Device& device, const Capture& capture, const fs::path& mo
   const ModelFolder folder = coarseFolder(model);
   FieldConfig coarse = coarseConfig(options.config, grid);
   TrainingLoopOptions loop = options.loop;
-  loop.resume = folder.manifest().has_value();
+  const bool goesOn = folder.manifest().has_value();
+  loop.resume = options.loop.resume || goesOn;  // also from a plan before the first checkpoint
   if (loop.minutes > 0) {
     loop.minutes *= options.config.coarseShare;
   } else {
     loop.steps = options.config.coarseSteps;
   }
-  if (loop.resume) {
+  if (goesOn) {
     // A finished field stays as it is: parts were trained from it, and other processes may be reading it.
     const ModelManifest manifest = requireManifest(folder, "field");
     if (manifest.plannedSteps > 0 && manifest.step >= manifest.plannedSteps) return true;

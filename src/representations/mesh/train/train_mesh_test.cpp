@@ -88,8 +88,6 @@ TEST_F(TrainMesh, TrainsPartsAloneToTheSameBytes) {
 
 TEST_F(TrainMesh, KeepsThePlanOfAPartThatHasNoCheckpointYet) {
   TrainMeshOptions options = smallOptions();
-  options.loop.steps = 0;
-  options.loop.minutes = 0.05;
   options.only = {"coarse"};
   EXPECT_TRUE(train("mesh", options).finished);
   const fs::path folder = scene / "mesh" / "parts" / "block_0_0";
@@ -97,6 +95,8 @@ TEST_F(TrainMesh, KeepsThePlanOfAPartThatHasNoCheckpointYet) {
   ModelFolder(folder).writePlan({7, 3});
   options.only = {"block_0_0"};
   options.loop.resume = true;
+  options.loop.steps = 0;
+  options.loop.minutes = 0.05;
   EXPECT_TRUE(train("mesh", options).finished);
   EXPECT_EQ(requireManifest(ModelFolder(folder)).step, 7);
 }
