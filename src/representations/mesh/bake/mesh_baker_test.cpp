@@ -256,6 +256,50 @@ TEST_F(BakeMeshScene, MayHaveCoarserTexelsThanTheTraining) {
   EXPECT_NO_THROW(open("coarse_texels"));
 }
 
+// The same model is baked with and without its views.
+TEST_F(BakeMeshScene, HasTrianglesThatOnlyViewsBetweenPhotosShow) {
+  const CubeScene scene({.isEnclosed = true, .photos = 16});
+  TrainMeshOptions options;
+  options.config = smallMeshConfig();
+  options.config.finalShare = 0;
+  options.config.enoughPhotos = 40;
+  options.config.coarseSteps = 120;
+  options.blocks = {false, 1, 1};
+  options.loop.steps = 100;
+  options.loop.progress = false;
+  options.loop.checkpointSeconds = 1e6;
+  ASSERT_TRUE(trainMesh(*device_, scene.capture(), scene / "model", options).finished);
+  const auto countTriangles = [&](const std::string& name) {
+    const auto baker = makeMeshBaker(StoredMesh(*device_, scene / "model"), {.fallback = false});
+    return bakeScene(*baker, scene.capture(), *cube_ / name, {}).levels[0].counts[0].second;
+  };
+  const auto withViews = countTriangles("with_views");
+  fs::remove_all(scene / "model" / "views");
+  EXPECT_GT(withViews, countTriangles("without_views"));
+}
+
+TEST_F(BakeMeshScene, IsRefusedBeforeBakingIfItHasTooManyTiles) {
+  TrainMeshOptions options;
+  options.config = smallMeshConfig();
+  options.config.backgroundBlock = "none";
+  options.config.finalShare = 0;
+  options.config.coarseSteps = 4;
+  options.blocks = {false, 9, 9};
+  options.only = {"coarse", "block_4_4"};
+  options.loop.steps = 4;
+  options.loop.progress = false;
+  const fs::path folder = *cube_ / "many_blocks";
+  ASSERT_TRUE(trainMesh(*device_, cube_->capture(), folder, options).finished);
+  EXPECT_NO_THROW(makeMeshBaker(StoredMesh(*device_, folder), {.tilesPerBlock = 4}));
+  try {
+    makeMeshBaker(StoredMesh(*device_, folder), {.tilesPerBlock = 8});
+    FAIL() << "72 x 72 tiles are more than 5000";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("--tiles-per-block 8"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("72 x 72 tiles"), std::string::npos) << error.what();
+  }
+}
+
 TEST_F(BakeMeshScene, IsNotDrawnWithoutItsEncoders) {
   const BakedScene baked = bake("without_encoders", {.fallback = false, .inferredMaps = true});
   const fs::path encoder = contentPath(*cube_ / "without_encoders", baked.tileset.resources[0].uri);
