@@ -35,8 +35,8 @@ class Device {
     uint64_t bytes = 0, inUse = 0;
   };
   virtual OwnMemory ownMemory() const { return {}; }
-  // On a GPU, the following functions and run() throw Error if memory is insufficient or the device is lost; on the
-  // CPU, allocate() throws std::bad_alloc.
+  // On a GPU, the following functions and run() throw Error if memory is insufficient, an operation has more numbers
+  // than indices of 32 bits reach, or the device is lost; on the CPU, allocate() throws std::bad_alloc.
   virtual std::unique_ptr<Memory> allocate(size_t bytes) = 0;  // filled with zeros
   virtual void writeBytes(Memory& to, size_t offset, std::span<const std::byte> from) = 0;
   struct Reading {

@@ -105,11 +105,11 @@ TEST(Octahedra, PutEqualNumbersOfFacesIntoEverySquareAndCubeBetweenCells) {
   }
 }
 
-using Place = std::array<double, 3>;
+using Point = std::array<double, 3>;
 
 // Six times the volume of a tetrahedron, positive or negative.
-double signedVolume(const Place& a, const Place& b, const Place& c, const Place& d) {
-  const auto less = [&](const Place& p, int axis) { return p[axis] - a[axis]; };
+double sixfoldVolume(const Point& a, const Point& b, const Point& c, const Point& d) {
+  const auto less = [&](const Point& p, int axis) { return p[axis] - a[axis]; };
   double sum = 0;
   for (int x = 0; x < 3; ++x) {
     const int y = (x + 1) % 3, z = (x + 2) % 3;
@@ -118,16 +118,16 @@ double signedVolume(const Place& a, const Place& b, const Place& c, const Place&
   return sum;
 }
 
-Place toPoint(const Cell& cell) {
+Point toPoint(const Cell& cell) {
   return {1.0 * cell[0], 1.0 * cell[1], 1.0 * cell[2]};
 }
 
-bool isInTetrahedron(const std::array<Place, 4>& corners, const Place& point) {
-  const double whole = signedVolume(corners[0], corners[1], corners[2], corners[3]);
+bool isInTetrahedron(const std::array<Point, 4>& corners, const Point& point) {
+  const double whole = sixfoldVolume(corners[0], corners[1], corners[2], corners[3]);
   for (int i = 0; i < 4; ++i) {
-    std::array<Place, 4> part = corners;
+    std::array<Point, 4> part = corners;
     part[i] = point;
-    if (signedVolume(part[0], part[1], part[2], part[3]) / whole < 0) return false;
+    if (sixfoldVolume(part[0], part[1], part[2], part[3]) / whole < 0) return false;
   }
   return true;
 }
@@ -143,25 +143,25 @@ TEST(Octahedra, FillSpaceTogetherWithTetrahedra) {
   double octahedron = 0;
   for (uint32_t local = 0; local < kOuterFaces; ++local) {
     const auto c = octahedronFace(local);
-    octahedron += std::abs(signedVolume({}, toPoint(c[0]), toPoint(c[1]), toPoint(c[2]))) / 6;
+    octahedron += std::abs(sixfoldVolume({}, toPoint(c[0]), toPoint(c[1]), toPoint(c[2]))) / 6;
   }
   EXPECT_NEAR(octahedron, 4.0 / 3, 1e-12);
 
   std::mt19937 random(5);
   std::uniform_real_distribution<double> place(2, 4);  // in units of cells, from the vertex of a cell
   for (int i = 0; i < 2000; ++i) {
-    const Place point = {place(random), place(random), place(random)};
+    const Point point = {place(random), place(random), place(random)};
     int octahedra = 0, tetrahedra = 0;
     forFaces(7, kPlacement, [&](uint32_t local, const std::array<Cell, 3>& vertices) {
       if (local >= kOuterFaces) return;
       Cell centre = vertices[0];  // the corner along x
       centre[0] += (local & 1) != 0 ? 1 : -1;
-      octahedra += isInTetrahedron(
-          {toPoint(centre), toPoint(vertices[0]), toPoint(vertices[1]), toPoint(vertices[2])}, point);
+      octahedra +=
+          isInTetrahedron({toPoint(centre), toPoint(vertices[0]), toPoint(vertices[1]), toPoint(vertices[2])}, point);
     });
     for (int cube = 0; cube < 6 * 6 * 6; ++cube) {
       const Cell low = {cube % 6, cube / 6 % 6, cube / 36};
-      std::array<Place, 4> corners;
+      std::array<Point, 4> corners;
       size_t count = 0;
       for (int corner = 0; corner < 8; ++corner) {
         const Cell cell = plus(low, {corner & 1, corner >> 1 & 1, corner >> 2});
@@ -169,7 +169,7 @@ TEST(Octahedra, FillSpaceTogetherWithTetrahedra) {
         ASSERT_LT(count, 4u);
         corners[count++] = toPoint(cell);
       }
-      EXPECT_NEAR(std::abs(signedVolume(corners[0], corners[1], corners[2], corners[3])) / 6, 1.0 / 3, 1e-12);
+      EXPECT_NEAR(std::abs(sixfoldVolume(corners[0], corners[1], corners[2], corners[3])) / 6, 1.0 / 3, 1e-12);
       tetrahedra += isInTetrahedron(corners, point);
     }
     ASSERT_EQ(octahedra + tetrahedra, 1) << point[0] << " " << point[1] << " " << point[2];

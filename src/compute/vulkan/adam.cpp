@@ -9,7 +9,7 @@ namespace tessera {
 template <>
 void VulkanDevice::enqueue(const Adam& options) {
   const size_t count = options.parameters.count;
-  CHECK(count < size_t{1} << 31);
+  requireIndexable(count);
   CHECK(options.gradients.count == count);
   CHECK(options.firstMoments.count == count);
   CHECK(options.secondMoments.count == count);

@@ -111,7 +111,7 @@ template <>
 void VulkanDevice::enqueue(const GroupByBlock& options) {
   const uint32_t shares = std::max((options.samples.capacity + kRowsPerShare - 1) / kRowsPerShare, 1u);
   const size_t counts = size_t{shares} * options.blocks;
-  CHECK(counts < size_t{1} << 31);
+  requireIndexable(counts);
   arguments::GroupByBlockArguments arguments = {};
   arguments.samples = countArguments(options.samples);
   arguments.blockOfSample = deviceAddress(options.blockOfSample);

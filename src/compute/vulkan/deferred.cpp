@@ -41,7 +41,7 @@ template <>
 void VulkanDevice::enqueue(const DeferredBackward& options) {
   const size_t segments = options.segments.capacity;
   if (segments == 0) return;
-  CHECK(segments * kNumbers < size_t{1} << 31);
+  requireIndexable(segments * kNumbers);
   arguments::DeferredArguments arguments = deferredArguments(*this, options);
   arguments.specular = deviceAddress(options.specularGradients);
   arguments.compositedGradients = deviceAddress(options.compositedGradients);

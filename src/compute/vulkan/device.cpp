@@ -1,5 +1,7 @@
 #include "compute/vulkan/device.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -209,11 +211,17 @@ arguments::CountArguments VulkanDevice::partArguments(const Count& count) const 
           count.first ? deviceAddress(count.first) : noCounter_.address(), count.capacity, 0};
 }
 
+void requireIndexable(size_t numbers) {
+  if (numbers < size_t{1} << 31) return;
+  throw Error(
+      "vulkan", "", fmt::format("an operation has {} numbers, and indices on this device end at 2^31", numbers),
+      "lower samples_per_step, texels_per_step, max_rays or the sizes of networks and tables, or use --device cpu");
+}
+
 arguments::MatrixArguments matrixArguments(const Matrix<const float>& matrix, size_t rows) {
   if (!matrix) return {};
-  constexpr size_t kIndices = size_t{1} << 31;
-  CHECK(matrix.groupStride < kIndices);
-  if (rows > 0 && matrix.columns > 0) CHECK(matrix.offset(rows - 1, matrix.columns - 1) < kIndices);
+  requireIndexable(matrix.groupStride);
+  if (rows > 0 && matrix.columns > 0) requireIndexable(matrix.offset(rows - 1, matrix.columns - 1));
   return {deviceAddress(matrix.data), matrix.columns, matrix.rowStride, matrix.groupWidth,
           static_cast<uint32_t>(matrix.groupStride)};
 }

@@ -2,6 +2,7 @@
 // is allocated and freed while work is queued. All operations and shapes are tested in compute/device_test.cpp.
 #include "compute/vulkan/device.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "base/error.h"
 #include "base/random.h"
 #include "compute/adam.h"
 #include "compute/cpu/device.h"
@@ -142,6 +144,28 @@ TEST_P(VulkanDeviceTest, LosesNoGradientWhereManySamplesMeet) {
                                 .positionGradients = {}});
   const auto expected = reference::hashGridBackward(grid, doubles(positions), {}, doubles(gradients));
   expectNear(device_->read(tableGradients.all()), expected.table, 1e-4, "table gradients");
+}
+
+// The capacity alone decides, so the operands are small.
+TEST_P(VulkanDeviceTest, RefusesOperationsBeyondItsIndices) {
+  const HashGrid grid({.levels = 2, .features = 4, .log2TableSize = 3, .baseResolution = 2, .finestResolution = 64});
+  auto positions = device_->array<float>(3), encoded = device_->array<float>(grid.columns());
+  auto table = device_->array<float>(grid.parameters());
+  const auto encode = [&](uint32_t capacity) {
+    device_->run(HashGridForward{.grid = grid,
+                                 .samples = {capacity, {}},
+                                 .positions = positions.all(),
+                                 .table = table.all(),
+                                 .encoded = Matrix<float>(encoded, grid.columns())});
+  };
+  encode(1);
+  try {
+    encode(1u << 29);
+    FAIL() << "2^29 samples of 8 columns have more than 2^31 numbers";
+  } catch (const Error& error) {
+    EXPECT_THAT(error.reason(), testing::HasSubstr("2^31"));
+    EXPECT_THAT(error.remedy(), testing::HasSubstr("samples_per_step"));
+  }
 }
 
 TEST_P(VulkanDeviceTest, RunsEveryWidthOfNetworks) {

@@ -15,7 +15,7 @@ constexpr uint32_t kHashGridSamplesPerGroup = 128;  // local_size_x of the kerne
 
 void setLevels(const HashGrid& grid, arguments::LevelArguments* levels) {
   CHECK(grid.levels.size() <= size_t{TESSERA_MAX_LEVELS});
-  CHECK(grid.parameters() < size_t{1} << 31);
+  requireIndexable(grid.parameters());
   for (size_t l = 0; l < grid.levels.size(); ++l) {
     const HashGridLevel& level = grid.levels[l];
     levels[l] = {

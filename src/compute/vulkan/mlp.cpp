@@ -152,7 +152,7 @@ void VulkanDevice::enqueue(const MlpForward& options) {
   CHECK(options.input.columns == static_cast<uint32_t>(shape.inputs));
   CHECK(options.output.columns <= static_cast<uint32_t>(shape.outputs));
   CHECK(options.weights.count == shape.parameters());
-  CHECK(capacity * shape.activationsPerSample() < size_t{1} << 31);
+  requireIndexable(capacity * shape.activationsPerSample());
   if (capacity == 0) return;
 
   arguments::MlpForwardArguments arguments = {};
@@ -178,7 +178,7 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
   CHECK(options.input.columns == static_cast<uint32_t>(shape.inputs));
   CHECK(options.weights.count == shape.parameters());
   CHECK((!options.weightGradients || options.weightGradients.count == shape.parameters()));
-  CHECK(capacity * shape.activationsPerSample() < size_t{1} << 31);
+  requireIndexable(capacity * shape.activationsPerSample());
   if (capacity == 0) return;
 
   const size_t numberBytes = storesActivationsInHalf() ? 2 : sizeof(float);

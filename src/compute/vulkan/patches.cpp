@@ -18,11 +18,10 @@ namespace {
 
 // local_size_x of the kernels with one invocation per number or id, and of those with one per hit or row.
 constexpr uint32_t kPatchNumbersPerGroup = 256, kPatchRowsPerGroup = 128;
-constexpr size_t kPatchIndices = size_t{1} << 31;
 
 template <class Options>
 arguments::MixRowsArguments mixRowsArguments(const VulkanDevice& device, const Options& options) {
-  CHECK(size_t{options.samples.capacity} * options.perSample < kPatchIndices);
+  requireIndexable(size_t{options.samples.capacity} * options.perSample);
   arguments::MixRowsArguments arguments = {};
   arguments.samples = device.countArguments(options.samples);
   arguments.inputRows = device.countArguments(options.inputRows);
@@ -35,7 +34,7 @@ arguments::MixRowsArguments mixRowsArguments(const VulkanDevice& device, const O
 template <class Options>
 arguments::StoreTexelsArguments storeTexelsArguments(const VulkanDevice& device, const Options& options) {
   CHECK(options.features.columns == StoreTexelsForward::kFeatures);
-  CHECK(size_t{options.rows.capacity} * StoreTexelsForward::kStored < kPatchIndices);
+  requireIndexable(size_t{options.rows.capacity} * StoreTexelsForward::kStored);
   arguments::StoreTexelsArguments arguments = {};
   arguments.rows = device.countArguments(options.rows);
   arguments.offset = options.offset;
@@ -49,7 +48,7 @@ arguments::StoreTexelsArguments storeTexelsArguments(const VulkanDevice& device,
 template <>
 void VulkanDevice::enqueue(const PatchTexels& options) {
   CHECK((options.patchEdge >= 2u && options.patchEdge <= 64u));
-  CHECK(size_t{4} * options.samples.capacity < kPatchIndices);
+  requireIndexable(size_t{4} * options.samples.capacity);
   arguments::PatchTexelsArguments arguments = {};
   arguments.samples = countArguments(options.samples);
   arguments.patchOfFace = deviceAddress(options.patchOfFace);
@@ -65,8 +64,8 @@ void VulkanDevice::enqueue(const PatchTexels& options) {
 template <>
 void VulkanDevice::enqueue(const DistinctRows& options) {
   const uint32_t words = options.words();
-  CHECK(options.idCount < kPatchIndices);
-  CHECK(size_t{options.samples.capacity} * options.perSample < kPatchIndices);
+  requireIndexable(options.idCount);
+  requireIndexable(size_t{options.samples.capacity} * options.perSample);
   arguments::DistinctRowsArguments arguments = {};
   arguments.samples = countArguments(options.samples);
   arguments.ids = deviceAddress(options.ids);
@@ -120,7 +119,7 @@ template <>
 void VulkanDevice::enqueue(const MixRowsForward& options) {
   const uint32_t columns = options.output.columns;
   CHECK(options.input.columns == columns);
-  CHECK(size_t{options.samples.capacity} * columns < kPatchIndices);
+  requireIndexable(size_t{options.samples.capacity} * columns);
   arguments::MixRowsArguments arguments = mixRowsArguments(*this, options);
   arguments.source = matrixArguments(options.input, options.inputRows.capacity);
   arguments.mixed = matrixArguments(options.output, options.samples.capacity);

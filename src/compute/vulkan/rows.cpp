@@ -22,7 +22,7 @@ void VulkanDevice::moveRows(const Count& rows, const Slice<const uint32_t>& sour
   arguments.source = deviceAddress(source);
   arguments.from = matrixArguments(from, scatter ? rows.capacity : 0);
   arguments.to = matrixArguments(to, scatter ? 0 : rows.capacity);
-  CHECK(size_t{rows.capacity} * from.columns < size_t{1} << 31);
+  requireIndexable(size_t{rows.capacity} * from.columns);
   queue(kernel(kMoveRowsSpirv, {scatter}), arguments, countGroups(rows, kElementsPerGroup, from.columns));
   countedGroups_.changed(arguments.to.data, to.data.count * sizeof(float));  // counters may be moved as floats
 }

@@ -19,7 +19,7 @@ constexpr uint32_t kLookupsPerGroup = 64;  // local_size_x of the lookups
 
 void VulkanDevice::zeroRows(const Count& rows, uint32_t columns, const Slice<float>& numbers) {
   const size_t maximum = size_t{rows.capacity} * columns;
-  CHECK(maximum < size_t{1} << 31);
+  requireIndexable(maximum);
   queue(kernel(kZeroRowsSpirv), arguments::ZeroRowsArguments{countArguments(rows), deviceAddress(numbers), columns, 0},
         countGroups(rows, 256, columns));
 }
@@ -29,8 +29,8 @@ void VulkanDevice::enqueue(const DistinctTexels& options) {
   const VirtualGrid& grid = options.grid;
   const size_t corners = size_t{options.samples.capacity} * grid.corners();
   const size_t words = size_t{options.blocks} * grid.words();
-  CHECK(corners < size_t{1} << 31);
-  CHECK(words < size_t{1} << 31);
+  requireIndexable(corners);
+  requireIndexable(words);
   arguments::DistinctTexelsArguments arguments = {};
   arguments.grid = gridArguments(grid);
   arguments.samples = countArguments(options.samples);

@@ -185,7 +185,10 @@ inline uint64_t quadAddress(const Slice<const float>& slice) {
   return address;
 }
 
-// Converts a matrix to kernel arguments. CHECKs that a kernel's 32-bit indices reach the last of `rows` rows.
+// Throws Error if the 32-bit indices of kernels do not reach all numbers of an operand. Settings decide on these sizes.
+void requireIndexable(size_t numbers);
+
+// Converts a matrix to kernel arguments. Throws Error if a kernel's indices do not reach the last of `rows` rows.
 arguments::MatrixArguments matrixArguments(const Matrix<const float>& matrix, size_t rows);
 
 }  // namespace tessera

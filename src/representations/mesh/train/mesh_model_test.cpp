@@ -16,6 +16,33 @@
 namespace tessera {
 namespace {
 
+// A ray straight down beside the middle of a block, and its hits.
+class RayDown {
+ public:
+  static constexpr uint32_t kMaxHits = 200;
+  MeshHits hits;
+
+  RayDown(Device& device, float height)
+      : hits(device, 1, kMaxHits),
+        device_(device),
+        origin_(device.uploadArray(std::vector<float>{0.07f, 0.05f, height})),
+        direction_(device.uploadArray(std::vector<float>{0, 0, -1})),
+        counters_(device.array<uint32_t>(MeshHits::kCounters)) {
+    hits.counters = counters_;
+  }
+  MeshRays rays() const { return {1, origin_, direction_, {}}; }
+  // Returns the number of hits.
+  uint32_t trace(MeshLevel& level) {
+    level.trace(rays(), kMaxHits, false, hits);
+    return device_.read(counters_.all())[0];
+  }
+
+ private:
+  Device& device_;
+  Array<float> origin_, direction_;
+  Array<uint32_t> counters_;
+};
+
 TEST(MeshModel, RefusesAnImpossibleCoverage) {
   const MeshPart part{"block_0_0", 0, {}, {1, 1, 1}};
   const auto read = [&](const std::vector<uint32_t>& numbers) {
@@ -84,25 +111,17 @@ TEST(MeshModel, HasOnlyQuadsIfRequested) {
   MeshModel model(*device, config, {"block_0_0", 0, {}, {1, 1, 1}});
   MeshLevel& level = model.level(0);
   // The vertices are in the middles of cells, so a ray straight down meets one quad in each layer of cells.
-  const Array<float> origins = device->uploadArray(std::vector<float>{0.07f, 0.05f, 3}),
-                     directions = device->uploadArray(std::vector<float>{0, 0, -1});
+  RayDown ray(*device, 3);
   const uint32_t layers = static_cast<uint32_t>(config.meshCells);
-  MeshHits hits(*device, 1, 4 * layers);
-  Array<uint32_t> counters = device->array<uint32_t>(MeshHits::kCounters);
-  hits.counters = counters;
-  const auto trace = [&] {
-    level.trace({1, origins, directions, {}}, 4 * layers, false, hits);
-    return device->read(counters.all())[0];
-  };
-  ASSERT_EQ(trace(), layers);
+  ASSERT_EQ(ray.trace(level), layers);
   const FaceSet quads = FaceSet::quads(level.domain().grids);
-  for (const uint32_t face : device->read(hits.faces.part(0, layers))) EXPECT_TRUE(quads.contains(face));
+  for (const uint32_t face : device->read(ray.hits.faces.part(0, layers))) EXPECT_TRUE(quads.contains(face));
   FaceSet one(level.domain().grids);
-  one.add(device->read(hits.faces.part(0, 1))[0]);
+  one.add(device->read(ray.hits.faces.part(0, 1))[0]);
   level.limitToFaces(one);
-  EXPECT_EQ(trace(), 1u);
+  EXPECT_EQ(ray.trace(level), 1u);
   level.removeLimit();
-  EXPECT_EQ(trace(), layers) << "not the other faces of octahedra";
+  EXPECT_EQ(ray.trace(level), layers) << "not the other faces of octahedra";
 }
 
 // The sum of random multiples of the colours of rays through octahedra with random vertices, on the reference device.
@@ -251,23 +270,15 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
   MeshModel model(*device, config, {"block_0_0", 0, {}, {1, 1, 1}});
   MeshLevel& level = model.level(0);
   level.exclude(std::vector<bool>(level.domain().grids[0].cells(), true));
-  // One ray straight down through the middle of a column of cells, whose first hit is opaque and the second is not.
-  const Array<float> origins = device->uploadArray(std::vector<float>{0.07f, 0.05f, 3}),
-                     directions = device->uploadArray(std::vector<float>{0, 0, -1});
-  const MeshRays rays{1, origins, directions, {}};
-  constexpr uint32_t kMaxHits = 200;
-  MeshHits hits(*device, 1, kMaxHits);
-  Array<uint32_t> counters = device->array<uint32_t>(MeshHits::kCounters);
-  hits.counters = counters;
-  std::vector<float> logits(kMaxHits, 5);
+  RayDown ray(*device, 3);  // through the middle of a column of cells
+  std::vector<float> logits(RayDown::kMaxHits, 5);
   logits[0] = 0;  // half opaque; the second hit leaves a transmittance below a hundredth
   const Array<float> opacities = device->uploadArray(logits);
-  level.trace(rays, kMaxHits, false, hits);
-  const uint32_t all = device->read(counters.all())[0];
+  const uint32_t all = ray.trace(level);
   ASSERT_GT(all, 20u);
-  const std::vector<float> positions = device->read(hits.positions.part(0, size_t{3} * all));
+  const std::vector<float> positions = device->read(ray.hits.positions.part(0, size_t{3} * all));
   for (int update = 0; update < 40; ++update) {
-    level.addOccupancy(rays, hits, Matrix<const float>(opacities.all(), 1));
+    level.addOccupancy(ray.rays(), ray.hits, Matrix<const float>(opacities.all(), 1));
     level.refreshOccupancy(true);
   }
   std::vector<uint32_t> expected(level.domain().grids[0].words());
@@ -280,8 +291,7 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
     expected[cell / 32] |= 1u << cell % 32;
   }
   EXPECT_EQ(level.occupancy().bitWords(), expected);
-  level.trace(rays, kMaxHits, false, hits);
-  EXPECT_LT(device->read(counters.all())[0], all / 2) << "hits beyond the surface and its neighbours";
+  EXPECT_LT(ray.trace(level), all / 2) << "hits beyond the surface and its neighbours";
 }
 
 TEST(MeshModel, BeginsRaysAtADistanceInHalvesOfABlock) {
@@ -291,14 +301,9 @@ TEST(MeshModel, BeginsRaysAtADistanceInHalvesOfABlock) {
   MeshPart part{"block_0_0", 0, {}, {1, 1, 1}};
   part.halfBlockEdge = 0.25f;  // as of the background block of four blocks in a row
   MeshModel model(*device, config, part);
-  const Array<float> origins = device->uploadArray(std::vector<float>{0.07f, 0.05f, 0.9f}),
-                     directions = device->uploadArray(std::vector<float>{0, 0, -1});
-  MeshHits hits(*device, 1, 200);
-  Array<uint32_t> counters = device->array<uint32_t>(MeshHits::kCounters);
-  hits.counters = counters;
-  model.level(0).trace({1, origins, directions, {}}, 200, false, hits);
-  ASSERT_GT(device->read(counters.all())[0], 5u);
-  const float first = device->read(hits.distances.part(0, 1))[0];
+  RayDown ray(*device, 0.9f);
+  ASSERT_GT(ray.trace(model.level(0)), 5u);
+  const float first = device->read(ray.hits.distances.part(0, 1))[0];
   EXPECT_GE(first, 0.5f);
   EXPECT_LT(first, 0.7f);
 }
