@@ -17,12 +17,13 @@ void refuseCaptureFolder(const fs::path& model) {
 }
 
 // The rest of what defines a run is in blocks.json (the capture) and manifest.json (the number of steps).
-std::string reproductionHeader(const Device& device, const TrainingLoopOptions& loop, const std::string& flags) {
+std::string reproductionHeader(const Device& device, const TrainingLoopOptions& loop, const std::string& flags,
+                               const std::string& lengthOfMinutes) {
   return fmt::format(
-      "# tessera train CAPTURE MODEL --method {}{} --config THIS_FILE --steps {}\n"
+      "# tessera train CAPTURE MODEL --method {}{} --config THIS_FILE {}\n"
       "# CAPTURE: see blocks.json. Computed on {}.\n\n",
       loop.method, flags,
-      loop.minutes > 0 ? "PLANNED_STEPS_OF_manifest.json" : std::to_string(loop.steps > 0 ? loop.steps : kDefaultSteps),
+      loop.minutes > 0 ? lengthOfMinutes : fmt::format("--steps {}", loop.steps > 0 ? loop.steps : kDefaultSteps),
       device.target());
 }
 

@@ -11,8 +11,10 @@ namespace tessera {
 void refuseCaptureFolder(const fs::path& model);
 
 // Returns the first lines of config.toml, comments with the command that reproduces the run. `flags`: further flags of
-// that command, as " --grid blocks.json".
-std::string reproductionHeader(const Device& device, const TrainingLoopOptions& loop, const std::string& flags = {});
+// that command, as " --grid blocks.json". `lengthOfMinutes`: the flag in place of --minutes, whose number of steps
+// depends on the machine's speed.
+std::string reproductionHeader(const Device& device, const TrainingLoopOptions& loop, const std::string& flags = {},
+                               const std::string& lengthOfMinutes = "--steps PLANNED_STEPS_OF_manifest.json");
 
 // Returns the photo budget in MiB: `requestedMiB` if it is set; else `maxBytes` if all training photos, decoded, would
 // take more than that, which it logs; else 0, no limit.

@@ -143,6 +143,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
     folder.commit(state, trainable.parts(), [&](uint32_t part) {
       return trainable.isAsSaved(part) ? std::nullopt : std::optional<Bytes>(trainable.save(part));
     });
+    options.saved();
     savedAt = seconds();
   };
   const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };

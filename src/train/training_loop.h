@@ -51,6 +51,7 @@ struct TrainingLoopOptions {
   bool resume = false;
   bool progress = true;
   std::function<bool()> stopRequested = [] { return false; };  // true: save and return
+  std::function<void()> saved = [] {};                         // called after each checkpoint
 };
 
 struct TrainingResult {

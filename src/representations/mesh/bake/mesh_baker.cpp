@@ -1,6 +1,7 @@
 #include "representations/mesh/bake/mesh_baker.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <bit>
@@ -12,6 +13,7 @@
 #include "base/check.h"
 #include "base/error.h"
 #include "base/image_io.h"
+#include "base/log.h"
 #include "representations/mesh/bake/patch_order.h"
 #include "representations/mesh/content/fallback_mesh.h"
 #include "representations/mesh/content/infer_maps.h"
@@ -77,6 +79,7 @@ class MeshBaker final : public Baker {
 
   // Parts are in memory one after another, blocks row by row: of groups of blocks, only baked patches wait for others.
   void bake(const Capture& given, const BakeOptions& options, ContentSink& sink) override {
+    warnOfUnfinishedParts();
     options_ = options;
     sink_ = &sink;
     placeOn(frame_, grid_);
@@ -97,6 +100,15 @@ class MeshBaker final : public Baker {
   }
 
  private:
+  void warnOfUnfinishedParts() const {
+    const std::vector<std::string> unfinished = mesh_.findUnfinishedParts();
+    if (unfinished.empty()) return;
+    warn(
+        "{}: {}; the scene shows these places unfinished or empty; go on with tessera train ... --resume, then bake "
+        "again",
+        mesh_.folder().string(), fmt::join(unfinished, ", "));
+  }
+
   // Throws Error for what would be refused when the scene is written, after everything has been baked.
   void requireValidGrid() const {
     const std::string remedy =

@@ -1,5 +1,8 @@
 #include "representations/mesh/train/train_mesh.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <bit>
 #include <chrono>
@@ -149,6 +152,14 @@ void compareWithCoarseField(Device& device, const Capture& capture, const fs::pa
   if (needsViews) makeViewsBetween(capture, *coarse, model, config.enoughPhotos, viewSeed(config));
 }
 
+// Writes config.toml of a run. With --minutes, each part has a number of steps of its own.
+void writeConfig(const Device& device, const fs::path& model, MeshConfig& config, const TrainingLoopOptions& loop) {
+  const std::string minutes =
+      fmt::format("--minutes {:g}\n# (the steps of each part are in parts/*/manifest.json)", loop.minutes);
+  writeFileAtomically(ModelFolder(model).configPath(),
+                      reproductionHeader(device, loop, " --grid blocks.json", minutes) + configToToml(config.fields()));
+}
+
 // A part that is to be trained, with its share of the time that remains.
 struct PlannedPart {
   MeshPart part;
@@ -160,11 +171,12 @@ struct PlannedPart {
 std::vector<PlannedPart> planParts(const Capture& capture, const std::vector<MeshPart>& parts,
                                    const SurfaceSurvey& survey, const MeshConfig& config) {
   std::vector<PlannedPart> planned;
+  std::vector<std::string> empty;
   double blockPixels = 0, backgroundPixels = 0;
   for (const MeshPart& part : parts) {
     PlannedPart plan{part, survey.findStart(part, config.domain(part, 0))};
     if (plan.start.isEmpty()) {
-      if (!part.isBackground()) warn("{}: no training photo shows a surface in it; it stays empty", part.name);
+      if (!part.isBackground()) empty.push_back(part.name);
       continue;
     }
     (part.isBackground() ? backgroundPixels : blockPixels) += plan.start.pixels();
@@ -174,6 +186,8 @@ std::vector<PlannedPart> planParts(const Capture& capture, const std::vector<Mes
     throw Error(capture.root.string(), "transforms.json", "no training photo shows a surface in a block",
                 "check the camera poses and the masks");
   }
+  if (!empty.empty())
+    warn("blocks in which no training photo shows a surface, and which stay empty: {}", fmt::join(empty, ", "));
   constexpr double kLeastShare = 0.03;
   double background = 0;
   if (backgroundPixels > 0) {
@@ -209,8 +223,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     if (!options.loop.resume) viewsFolder(model).remove();
     if (!options.loop.resume) fs::remove(model / "run.json");
     keepLength(model, options.loop);
-    writeFileAtomically(run.folder.configPath(), reproductionHeader(device, options.loop, " --grid blocks.json") +
-                                                     configToToml(config.fields()));
+    writeConfig(device, model, config, options.loop);
     run.folder.writePlacement({{}, run.grid, given.sourceFromWorld, given.root, trainingNames(given)}, "mesh");
     writeMeshManifest(model, parts);  // from now on, --resume takes settings and blocks from this folder
   } else {
@@ -218,6 +231,14 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
   }
   if (!trainCoarseField(device, given, model, run.grid, options)) return {};
   compareWithCoarseField(device, given, model, config);
+  const Capture capture = addViewsBetween(config.leavesTransientsOut() ? applyTransientMasks(given, model) : given,
+                                          model, viewSeed(config));
+  // The budget counts the views between the photos, too, and decides on the order in which photos are drawn.
+  const double photoBudgetMiB = resolvePhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
+  if (photoBudgetMiB != config.photoBudgetMiB) {
+    config.photoBudgetMiB = photoBudgetMiB;
+    writeConfig(device, model, config, options.loop);
+  }
   writeMeshManifest(model, parts);
   const auto isRequested = [&](const std::string& name) {
     return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
@@ -229,10 +250,6 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     return sum;  // only the coarse field
   }
 
-  const Capture capture = addViewsBetween(config.leavesTransientsOut() ? applyTransientMasks(given, model) : given,
-                                          model, viewSeed(config));
-  // The budget counts the views between the photos, too.
-  config.photoBudgetMiB = resolvePhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
   // Vertices start at the surface only in blocks whose training begins now.
   const auto startsAtSurface = [&](const MeshPart& part) {
     return config.surfaceStart && !part.isBackground() && isRequested(part.name) && !partFolder(model, part).manifest();
@@ -244,11 +261,18 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     const auto coarse = loadFieldModel(device, coarseFolder(model).root());
     survey.emplace(capture, *coarse, std::any_of(parts.begin(), parts.end(), startsAtSurface));
     planned = planParts(capture, parts, *survey, config);
+    survey->forgetTiles();
     coarseFile = coarseFolder(model).root() / requireManifest(coarseFolder(model)).files.at(0);
   }
   const Safetensors coarseState = readSafetensors(coarseFile);
-  double shareLeft = 0, samples = 0, rays = 0;
-  for (const PlannedPart& plan : planned) shareLeft += plan.share;
+  double shareLeft = 0, samples = 0, rays = 0, trainedPixels = 0;
+  std::vector<MeshPart> shown;
+  for (const PlannedPart& plan : planned) {
+    shareLeft += plan.share;
+    shown.push_back(plan.part);
+  }
+  writeShownParts(model, shown);
+  options.loop.saved = [&] { writeMeshManifest(model, shown); };
   for (PlannedPart& plan : planned) {
     const ModelFolder folder = partFolder(model, plan.part);
     if (!isRequested(plan.part.name)) continue;
@@ -274,7 +298,6 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
            through > 0 ? fmt::format(", {:.0f} only what is behind it", through) : "");
     fs::create_directories(folder.root());
     const TrainingResult result = runTraining(trainer, folder, loop);
-    writeMeshManifest(model, parts);
     sum.step += result.step;
     sum.plannedSteps += result.plannedSteps;
     sum.seconds += result.seconds;
@@ -285,7 +308,10 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
       inform("{}: {:.1f} hits a ray, {:.2f} M a second", plan.part.name, result.samplesPerRay,
              result.samplesPerSecond / 1e6);
     }
-    if (!plan.part.isBackground()) sum.psnr = result.psnr;
+    if (!plan.part.isBackground() && samplesOfPart > 0) {
+      trainedPixels += pixels;
+      sum.psnr += (result.psnr - sum.psnr) * pixels / trainedPixels;  // the mean by pixels
+    }
     if (!result.finished) {
       sum.finished = false;
       break;

@@ -1,13 +1,17 @@
 #include "representations/mesh/train/train_mesh.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <map>
+#include <set>
 
 #include "base/error.h"
 #include "base/file.h"
 #include "representations/mesh/testing/small_mesh.h"
 #include "representations/mesh/train/mesh_renderer.h"
+#include "train/photo_window.h"
+#include "train/run_folder.h"
 #include "train/testing/cube_scene.h"
 
 namespace tessera {
@@ -84,6 +88,76 @@ TEST_F(TrainMesh, TrainsPartsAloneToTheSameBytes) {
     EXPECT_TRUE(train("apart", options).finished);
   }
   EXPECT_EQ(lastCheckpoints(scene / "apart"), lastCheckpoints(scene / "whole"));
+}
+
+TEST_F(TrainMesh, StatesWhatIsLeftToTrain) {
+  using testing::ElementsAre;
+  TrainMeshOptions options = smallOptions();
+  options.only = {"coarse", "block_1_0"};
+  EXPECT_TRUE(train("mesh", options).finished);
+  const auto findUnfinished = [&] { return StoredMesh(*device, scene / "mesh").findUnfinishedParts(); };
+  EXPECT_THAT(findUnfinished(), ElementsAre("block_0_0 has not been trained", "background has not been trained"));
+  options.loop.resume = true;
+  options.only = {"block_0_0"};
+  int asked = 0;
+  options.loop.stopRequested = [&] { return ++asked > 6; };
+  EXPECT_FALSE(train("mesh", options).finished);
+  EXPECT_THAT(findUnfinished(),
+              ElementsAre("block_0_0 has been trained for 6 of 20 steps", "background has not been trained"));
+
+  options.loop.stopRequested = [] { return false; };
+  options.only = {};
+  EXPECT_TRUE(train("mesh", options).finished);
+  EXPECT_THAT(findUnfinished(), ElementsAre());
+  fs::remove_all(scene / "mesh" / "parts" / "block_1_0");
+  writeMeshManifest(scene / "mesh", {});
+  EXPECT_THAT(findUnfinished(), ElementsAre("block_1_0 has not been trained"));
+  writeShownParts(scene / "mesh", {{"block_0_0", 0, {}, {1, 1, 1}}});
+  EXPECT_THAT(findUnfinished(), ElementsAre()) << "photos show nothing of the others";
+  for (const char* const text : {"", "{}", R"({"parts": "block_0_0"})", R"({"parts": [1]})"}) {
+    writeFileAtomically(scene / "mesh" / "shown.json", text);
+    EXPECT_THROW(findUnfinished(), Error) << text;
+  }
+}
+
+// Whoever watches a training looks at the folder's manifest alone.
+TEST_F(TrainMesh, SumsUpItsPartsAtEachCheckpoint) {
+  TrainMeshOptions options = smallOptions();
+  options.loop.checkpointSeconds = 0;
+  std::set<int64_t> steps;
+  options.loop.stopRequested = [&] {
+    steps.insert(requireManifest(ModelFolder(scene / "mesh")).step);
+    return false;
+  };
+  EXPECT_TRUE(train("mesh", options).finished);
+  EXPECT_GT(steps.size(), size_t{2} * kSteps);
+  const ModelManifest manifest = requireManifest(ModelFolder(scene / "mesh"));
+  EXPECT_EQ(manifest.step, manifest.plannedSteps);
+}
+
+// Photos are drawn in another order if they do not fit the memory.
+TEST_F(TrainMesh, KeepsThePhotoBudgetOfViewsBetweenPhotos) {
+  const CubeScene few({.isEnclosed = true, .photos = 16});
+  TrainMeshOptions options = smallOptions();
+  options.config.enoughPhotos = 40;
+  options.config.coarseSteps = 120;
+  options.only = {"coarse"};
+  const double photos = static_cast<double>(decodedBytes(few.capture(), few.capture().photosIn(Split::train)));
+  options.memoryMiB = photos / (1 << 20);
+  options.memoryMiB *= 1.01 * photos / options.bytesForPhotos();
+  EXPECT_TRUE(trainMesh(*device, few.capture(), few / "mesh", options).finished);
+  ASSERT_TRUE(fs::exists(few / "mesh" / "views"));
+  EXPECT_NEAR(savedConfig<MeshConfig>(few / "mesh").photoBudgetMiB, 1.01 * photos / (1 << 20), 0.01);
+}
+
+TEST_F(TrainMesh, StatesTheCommandThatRepeatsIt) {
+  TrainMeshOptions options = smallOptions();
+  options.only = {"coarse"};
+  EXPECT_TRUE(train("steps", options).finished);
+  EXPECT_THAT(readTextFile(scene / "steps" / "config.toml"), testing::HasSubstr("THIS_FILE --steps 20\n"));
+  options.loop.minutes = 0.01;
+  EXPECT_TRUE(train("minutes", options).finished);
+  EXPECT_THAT(readTextFile(scene / "minutes" / "config.toml"), testing::HasSubstr("THIS_FILE --minutes 0.01\n"));
 }
 
 TEST_F(TrainMesh, KeepsThePlanOfAPartThatHasNoCheckpointYet) {

@@ -1,5 +1,10 @@
 #include "representations/mesh/train/trained_mesh.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
 #include "base/error.h"
 #include "train/block_frame.h"
 #include "train/run_folder.h"
@@ -20,6 +25,23 @@ void forEachCheckpoint(const fs::path& folder, const MeshConfig& config, const B
   }
 }
 
+fs::path shownFile(const fs::path& folder) {
+  return folder / "shown.json";
+}
+
+// Returns nothing if the folder has no such record yet. Throws Error if it is malformed.
+std::optional<std::vector<std::string>> readShownParts(const fs::path& folder) {
+  const fs::path file = shownFile(folder);
+  if (!fs::exists(file)) return std::nullopt;
+  const nlohmann::json names = nlohmann::json::parse(readTextFile(file), nullptr, false);
+  const auto isName = [](const nlohmann::json& name) { return name.is_string(); };
+  if (!names.is_object() || !names.contains("parts") || !names["parts"].is_array() ||
+      !std::all_of(names["parts"].begin(), names["parts"].end(), isName)) {
+    throw Error(file.string(), "parts", "is missing, or not a list of names", "go on with tessera train ... --resume");
+  }
+  return names["parts"].get<std::vector<std::string>>();
+}
+
 }  // namespace
 
 StoredMesh::StoredMesh(Device& device, const fs::path& folder) : device_(&device), folder_(folder) {
@@ -34,6 +56,24 @@ StoredMesh::StoredMesh(Device& device, const fs::path& folder) : device_(&device
                     });
   if (parts_.empty())
     throw Error(folder.string(), "parts", "none has been trained yet", "go on with tessera train ... --resume");
+}
+
+std::vector<std::string> StoredMesh::findUnfinishedParts() const {
+  const std::optional<std::vector<std::string>> shown = readShownParts(folder_);
+  std::vector<std::string> unfinished;
+  for (const MeshPart& part : makeMeshParts(grid_, config_.hasBackground())) {
+    if (shown && std::find(shown->begin(), shown->end(), part.name) == shown->end()) continue;
+    const std::optional<ModelManifest> manifest = partFolder(folder_, part).manifest();
+    if (!manifest) {
+      unfinished.push_back(part.name + " has not been trained");
+    } else if (manifest->plannedSteps == 0) {
+      unfinished.push_back(fmt::format("{} has been trained for {} steps", part.name, manifest->step));
+    } else if (manifest->step < manifest->plannedSteps) {
+      unfinished.push_back(
+          fmt::format("{} has been trained for {} of {} steps", part.name, manifest->step, manifest->plannedSteps));
+    }
+  }
+  return unfinished;
 }
 
 std::unique_ptr<MeshModel> StoredMesh::load(const MeshPart& part, MeshUse use) const {
@@ -60,6 +100,12 @@ std::vector<SurfaceCoverage> readMeshCoverage(const fs::path& folder) {
                       if (const auto checked = readCoverage(part, file, checkpoint)) coverage.push_back(*checked);
                     });
   return coverage;
+}
+
+void writeShownParts(const fs::path& folder, const std::vector<MeshPart>& parts) {
+  nlohmann::json names = nlohmann::json::array();
+  for (const MeshPart& part : parts) names.push_back(part.name);
+  writeFileAtomically(shownFile(folder), nlohmann::json{{"parts", names}}.dump(2) + "\n");
 }
 
 void writeMeshManifest(const fs::path& folder, const std::vector<MeshPart>& parts) {

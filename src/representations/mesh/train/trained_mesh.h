@@ -37,6 +37,9 @@ class StoredMesh {
   const MeshConfig& config() const { return config_; }
   const BlockGrid& grid() const { return grid_; }
   const std::vector<Part>& parts() const { return parts_; }  // the outside last
+  // What is left to train, in words: the parts that photos show, and that have not been trained to their end. Throws
+  // Error if shown.json is malformed.
+  std::vector<std::string> findUnfinishedParts() const;
 
   // Loads a part. Throws Error if its checkpoint is missing or malformed.
   std::unique_ptr<MeshModel> load(const MeshPart& part, MeshUse use) const;
@@ -63,7 +66,11 @@ TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder);
 // Error as loadTrainedMesh does, except if no part has been trained.
 std::vector<SurfaceCoverage> readMeshCoverage(const fs::path& folder);
 
-// Writes the manifest of the mesh, which sums up those of its parts. Throws Error if it cannot be written.
+// Writes the manifest of the mesh, which sums up those of these parts. Throws Error if it cannot be written.
 void writeMeshManifest(const fs::path& folder, const std::vector<MeshPart>& parts);
+
+// Writes shown.json: the parts that photos show something of. The others are never trained and have no triangles.
+// Throws Error if it cannot be written.
+void writeShownParts(const fs::path& folder, const std::vector<MeshPart>& parts);
 
 }  // namespace tessera
