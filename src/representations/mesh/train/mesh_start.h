@@ -41,7 +41,7 @@ class SurfaceSurvey {
   // surface that is not in front of the region. The tiles through a block are those whose middles' rays cross it, leave
   // it not through its bottom, and show nothing on this side of its grid's far end; neither do the tiles around them.
   MeshStart findStart(const MeshPart& part, const OctahedraDomain& domain) const;
-  // Frees what findStart needs, which must not be called any more: it is as large as the photos of a large capture.
+  // Frees what findStart needs, about 100 bytes for each tile of a photo. It must not be called any more.
   void forgetTiles() { sights_ = {}; }
   // Returns the displacements of a block's vertices, [cells][3] in edges of a cell, to the mean of the points of
   // surfaces that photos show in the cell; zero if there are fewer than three.
