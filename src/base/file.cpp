@@ -72,15 +72,18 @@ Bytes readFileStart(const fs::path& path, uint64_t bytes) {
 }
 
 void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes, bool durable) {
-  std::error_code status;
-  if (path.has_parent_path()) fs::create_directories(path.parent_path(), status);
+  std::error_code status, ofFolder;
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), ofFolder);
   // A pipe or a device (/dev/stdout) is written to directly, because a rename would replace it.
   const bool isStream =
       fs::exists(path, status) && !fs::is_regular_file(path, status) && !fs::is_directory(path, status);
   fs::path partial = path;
   if (!isStream) partial += ".partial-" + std::to_string(::getpid());
   const int file = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-  if (file < 0) failWriting(path, partial);
+  if (file < 0) {
+    if (ofFolder) errno = ofFolder.value();  // why its folder is not there
+    failWriting(path, partial);
+  }
   size_t written = 0;
   while (written < bytes.size()) {
     const ssize_t count = ::write(file, bytes.data() + written, bytes.size() - written);

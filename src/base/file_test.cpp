@@ -82,6 +82,18 @@ TEST_F(File, NamesThePathItCannotRead) {
   EXPECT_THROW(readFile(root_), Error);
 }
 
+TEST_F(File, SaysWhyItCannotMakeTheFolder) {
+  // Not even the administrator can make a folder there.
+  const fs::path file = "/sys/folder/file.txt";
+  try {
+    writeFileAtomically(file, std::string_view("text"));
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.subject(), file.string());
+    EXPECT_EQ(error.reason().find("No such file"), std::string::npos) << error.what();
+  }
+}
+
 TEST_F(File, RejectsFilesAboveTheLimitBeforeReading) {
   const fs::path path = root_ / "huge";
   writeFileAtomically(path, std::string_view("text"));

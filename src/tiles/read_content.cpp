@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "tiles/content_file.h"
 #include "tiles/glb.h"
+#include "tiles/scene_folder.h"
 
 namespace tessera {
 namespace {
@@ -15,13 +16,19 @@ Error noContent(const fs::path& path, const std::string& reason) {
   return {path.string(), "", reason, "copy the scene again, or bake it again"};
 }
 
+void requireIntact(const fs::path& path, const Bytes& file) {
+  if (!hasItsDigest(path, file)) throw noContent(path, "is damaged: its bytes are not those that were written");
+}
+
 }  // namespace
 
 std::unique_ptr<Content> readContent(const fs::path& path, const ContentCodec& codec, const Resources& resources,
                                      const ContentLimits& limits) {
   std::string reason;
-  auto content = codec.decode(readFile(path, limits.fileBytes), resources, reason, limits);
+  const Bytes file = readFile(path, limits.fileBytes);
+  auto content = codec.decode(file, resources, reason, limits);
   if (!content) throw noContent(path, reason);
+  requireIntact(path, file);
   return content;
 }
 
@@ -54,6 +61,7 @@ std::shared_ptr<const Resource> readResource(const fs::path& path, const Content
   const Bytes file = readFile(path, limits.fileBytes);
   auto decoded = codec.decodeResource(file, resource, reason, limits);
   if (!decoded) throw noContent(path, reason);
+  requireIntact(path, file);
   // The size that budgets have charged for it.
   const uint64_t charged = codec.resourceMemoryBytes(resource, file.size());
   if (decoded->memoryBytes() > charged) {

@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <bit>
 #include <cctype>
+#include <cstring>
 #include <regex>
 #include <set>
 
@@ -14,12 +17,14 @@
 namespace tessera {
 namespace {
 
+static_assert(std::endian::native == std::endian::little);  // for digests
+
 // Returns a 64-bit digest, which suffices against accidental collisions but not against forgery.
 std::string computeDigest(std::span<const std::byte> bytes) {
   uint64_t digest = mix64(bytes.size());
   for (size_t at = 0; at < bytes.size(); at += 8) {
     uint64_t word = 0;
-    for (size_t i = 0; i < 8 && at + i < bytes.size(); ++i) word |= static_cast<uint64_t>(bytes[at + i]) << (8 * i);
+    std::memcpy(&word, bytes.data() + at, std::min<size_t>(8, bytes.size() - at));
     digest = mix64(digest ^ word);
   }
   return fmt::format("{:016x}", digest);
@@ -104,6 +109,13 @@ Tileset readTileset(const fs::path& folder) {
   if (!tileset) throw Error(path.string(), "", reason, "bake the scene again");
   requireFiles(folder, *tileset);
   return std::move(*tileset);
+}
+
+bool hasItsDigest(const fs::path& file, std::span<const std::byte> bytes) {
+  const std::string name = file.filename().string();
+  if (!isOurs(name)) return true;
+  constexpr size_t kDigits = 16;
+  return name.compare(name.rfind('-') + 1, kDigits, computeDigest(bytes)) == 0;
 }
 
 fs::path contentPath(const fs::path& folder, const std::string& uri) {

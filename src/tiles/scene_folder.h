@@ -34,4 +34,7 @@ Tileset readTileset(const fs::path& folder);
 // Returns the file of a uri of a tileset that was read from `folder`. Throws Error if it leads out of the folder.
 fs::path contentPath(const fs::path& folder, const std::string& uri);
 
+// Returns whether the bytes of a file are those that were written, if its name contains a digest. Other names pass.
+bool hasItsDigest(const fs::path& file, std::span<const std::byte> bytes);
+
 }  // namespace tessera

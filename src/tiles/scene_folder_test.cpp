@@ -55,6 +55,20 @@ TEST_F(SceneFolder, IsReadBack) {
   EXPECT_EQ(readTextFile(contentPath(root_, uri)), "a1,0");
 }
 
+TEST_F(SceneFolder, KnowsWhetherAFileHoldsWhatWasWritten) {
+  const Tileset tileset = bake("a");
+  for (const std::string& uri : {tileset.tiles[1].contents[0].uri, tileset.resources[0].uri}) {
+    const fs::path file = contentPath(root_, uri);
+    Bytes bytes = readFile(file);
+    EXPECT_TRUE(hasItsDigest(file, bytes)) << uri;
+    bytes.back() ^= std::byte{1};
+    EXPECT_FALSE(hasItsDigest(file, bytes)) << uri;
+    EXPECT_TRUE(hasItsDigest(root_ / "tile.glb", bytes)) << "its name contains no digest";
+    bytes.pop_back();
+    EXPECT_FALSE(hasItsDigest(file, bytes)) << uri;
+  }
+}
+
 TEST_F(SceneFolder, IsTheOldSceneUntilTheNewOneIsWhole) {
   const Tileset before = bake("old");
   SceneFolderWriter(root_).commit(before);
