@@ -30,7 +30,8 @@
 #   borders      the error of the city's scene near walls between blocks against that elsewhere, and the same of a scene with one
 #                block in place of four
 #   processes    four blocks as four processes and one after another: equal bytes
-#   killed       killed at ten random moments or more, at least one in the final stage, and baking at three: equal bytes
+#   killed       killed at ten random moments or more, at least one in the final stage and one in the extraction of
+#                triangles, and baking at three: equal bytes
 #   memory       peak memory of baking six blocks, of rendering their model, and of both for one block
 #   vulkan       300 steps with `vulkan` against `cpu`: PSNR of the training photos
 #   fallback     the ordinary glTF meshes in the contents of that scene's finest level, in Blender, assimp and three.js: they load with
@@ -447,10 +448,15 @@ processes() {
   verdict "four processes, checkpoints that differ from those of one process" "$(differing "$work/tiny-four")" '<=' 0
 }
 
-# interrupted ARGUMENTS...: runs tessera, and kills it after a random part of `lasted` seconds; succeeds if it was killed.
+# interrupted ARGUMENTS...: runs tessera, and kills it after a random part of `lasted` seconds, or, if `after` is not
+# empty, soon after it has printed that; succeeds if it was killed.
 interrupted() {
   "$tessera" "$@" > "$work/interrupted.log" 2>&1 &
-  local pid=$!
+  local pid=$! lasted=$lasted
+  if [ -n "${after:-}" ]; then
+    while kill -0 "$pid" 2> /dev/null && ! grep -q "$after" "$work/interrupted.log"; do sleep 0.01; done
+    lasted=0.2
+  fi
   sleep "$(awk -v l="$lasted" -v r="$RANDOM" 'BEGIN { printf "%.3f", 0.05 + l * r / 32768 }')"
   if kill -9 "$pid" 2> /dev/null; then
     wait "$pid" 2> /dev/null || true
@@ -462,25 +468,30 @@ interrupted() {
 
 killed() {
   tiny_city
-  local started=$SECONDS kills=0 lasted steps
+  local started=$SECONDS kills=0 lasted steps after last
   rm -rf "$work/tiny-killed" "$work"/tiny-*.scene
   tiny tiny-timed
   lasted=$((SECONDS - started))
   rm -rf "$work/tiny-timed"
-  local inFinalStage=0
-  while [ "$kills" -lt 10 ] || [ "$inFinalStage" -eq 0 ]; do
+  local inFinalStage=0 inExtraction=0 extracting='looking for the triangles that photos show'
+  while [ "$kills" -lt 10 ] || [ "$inFinalStage" -eq 0 ] || [ "$inExtraction" -eq 0 ]; do
+    after=
+    [ "$kills" -lt 9 ] || [ "$inExtraction" -gt 0 ] || after=$extracting
     if interrupted train "$work/tiny" "$work/tiny-killed" "${tiny_flags[@]}" --resume --checkpoint-seconds 0.3; then
       kills=$((kills + 1))
       steps=$({ cat "$work"/tiny-killed/parts/*/manifest.json 2> /dev/null || true; } | jq -s -c 'map(.step)')
       [ "$(jq 'any(.[]; . > 96 and . < 120)' <<< "$steps")" = false ] || inFinalStage=$((inFinalStage + 1))
-      echo "kill $kills; steps of parts: $steps; $(tail -n 1 "$work/interrupted.log" | tr '\r' '\n' | tail -n 1)"
+      last=$(tail -n 1 "$work/interrupted.log" | tr '\r' '\n' | tail -n 1)
+      case $last in *"$extracting"*) inExtraction=$((inExtraction + 1)) ;; esac
+      echo "kill $kills; steps of parts: $steps; $last"
     else
       rm -rf "$work/tiny-killed"
     fi
-    [ "$kills" -lt 60 ] || die "none of 60 kills was in the final stage"
+    [ "$kills" -lt 60 ] || die "of 60 kills, $inFinalStage were in the final stage, and $inExtraction in the extraction"
   done
+  after=
   tiny tiny-killed --resume
-  echo "$inFinalStage of $kills kills in the final stage, which begins with the extraction"
+  echo "$inFinalStage of $kills kills in the final stage, $inExtraction in the extraction of triangles"
   verdict "killed $kills times, checkpoints that differ" "$(differing "$work/tiny-killed")" '<=' 0
   started=$SECONDS
   "$tessera" bake "$work/tiny-one" "$work/tiny-one.scene" --capture "$work/tiny"

@@ -195,6 +195,7 @@ TEST_F(CommandLine, EndsWithTwoWhenItIsUsedWrongly) {
   expectUsageError({"import", city()});
   expectUsageError({"import", city(), at("i"), "--downscale", "0"});
   expectUsageError({"import", city(), at("i"), "--threads", "-1"});
+  EXPECT_TRUE(contains(expectUsageError({"import", city(), at("i"), "--mask-command", ""}), "names no program"));
   expectUsageError({"synth", "city", at("none"), "--threads", "-1"});
   expectUsageError({"render", model(), at("r")});
   expectUsageError({"render", model(), at("r"), "--views", city(), "--path", at("path.json")});
@@ -351,7 +352,9 @@ TEST_F(CommandLine, ExplainsModelsThatAreBroken) {
   json manifest = json::parse(readTextFile(fs::path(foreign) / "manifest.json"));
   manifest["method"] = "mesh";
   writeFileAtomically(fs::path(foreign) / "manifest.json", manifest.dump());
-  EXPECT_TRUE(contains(expectFailure({"train", city(), foreign, "--resume", "--steps", "9"}), "mesh"));
+  EXPECT_TRUE(
+      contains(expectFailure({"train", city(), foreign, "--method", "field", "--resume", "--steps", "9"}), "mesh"));
+  EXPECT_TRUE(contains(expectFailure({"train", city(), foreign, "--resume", "--steps", "9"}), foreign));
 
   const std::string misset = copied("misset");
   writeFileAtomically(fs::path(misset) / "config.toml", "grid_levels = 5\n");

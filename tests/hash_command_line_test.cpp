@@ -123,9 +123,12 @@ TEST_F(HashCommandLine, ResumesAnExistingModel) {
   EXPECT_EQ(other.exitCode, 1);
   EXPECT_NE(other.err.find("2x1"), std::string::npos) << other.err;
   EXPECT_EQ(step(), 30);
-  const Said method = run({"train", at("city"), model, "--steps", "40", "--resume"});
+  const Said method = run({"train", at("city"), model, "--method", "field", "--steps", "40", "--resume"});
   EXPECT_EQ(method.exitCode, 1);
   EXPECT_NE(method.err.find("resume with --method hash"), std::string::npos) << method.err;
+  const Said same = run({"train", at("city"), model, "--steps", "34", "--resume"});
+  EXPECT_EQ(same.exitCode, 0) << "with the method of the folder: " << same.err;
+  EXPECT_EQ(step(), 34);
 }
 
 TEST_F(HashCommandLine, RejectsOptionsThatItDoesNotSupport) {

@@ -71,9 +71,12 @@ TEST_F(MeshCommandLine, TrainsPartsApartBakesAndRendersASyntheticCity) {
   const Said coarse = train("model", {"--steps", "120", "--only-blocks", "coarse"});
   ASSERT_EQ(coarse.exitCode, 0) << coarse.err;
   EXPECT_FALSE(fs::exists(folder_ / "model/parts/block_0_0/manifest.json"));
-  for (const char* parts : {"block_1_0", "background,block_0_0"}) {
+  for (const char* parts : {"block_1_0", "background, block_0_0"}) {
     const Said trained = train("model", {"--steps", "120", "--resume", "--only-blocks", parts});
     ASSERT_EQ(trained.exitCode, 0) << trained.err;
+    const Said evaluated = run({"eval", at("model"), at("city"), "--json", "-"});
+    EXPECT_EQ(contains(evaluated.err, "background has not been trained"), std::string(parts) == "block_1_0")
+        << evaluated.err;
   }
   const json model = told({"info", at("model"), "--json"});
   EXPECT_EQ(model.at("method"), "mesh");
@@ -134,6 +137,24 @@ TEST_F(MeshCommandLine, RejectsOptionsThatItDoesNotSupport) {
   refuses(run({"bake", at("few"), at("no.scene"), "--tiles-per-block", "3"}), "--tiles-per-block 3");
   refuses(run({"bake", at("few"), at("no.scene"), "--maps", "guessed"}), "stored");
   EXPECT_FALSE(fs::exists(at("no.scene")));
+  refuses(run({"bake", at("few"), at("few")}), "holds a model");
+  refuses(run({"bake", at("few"), at("city")}), "holds a capture");
+  refuses(run({"eval", at("few"), at("city"), "--lod", "1"}), "--lod: applies to scenes");
+  refuses(run({"render", at("few"), at("pictures"), "--views", at("city"), "--memory-mib", "9"}), "--memory-mib");
+}
+
+TEST_F(MeshCommandLine, ResumesWithTheMethodOfTheFolder) {
+  const std::vector<std::string> coarse = {"train", at("city"), at("same"), "--resume", "--only-blocks", "coarse"};
+  ASSERT_EQ(train("same", {"--steps", "8", "--only-blocks", "coarse"}).exitCode, 0);
+  const Said said = run(coarse);
+  EXPECT_EQ(said.exitCode, 0) << said.err;
+  std::vector<std::string> other = coarse;
+  other.insert(other.end(), {"--method", "volume"});
+  const Said refused = run(other);
+  EXPECT_NE(refused.exitCode, 0);
+  EXPECT_TRUE(contains(refused.err, "mesh")) << refused.err;
+  writeFileAtomically(at("scene.folder/tileset.json"), "{}");
+  EXPECT_TRUE(contains(train("scene.folder", {"--steps", "8"}).err, "holds a scene"));
 }
 
 }  // namespace

@@ -2,12 +2,26 @@
 
 #include "apps/tessera/model_source.h"
 #include "apps/tessera/scene_source.h"
+#include "base/error.h"
 
 namespace tessera {
+namespace {
+
+bool holdsScene(const fs::path& folder) {
+  return fs::exists(folder / "tileset.json");
+}
+
+}  // namespace
+
+void requireSceneFor(const RenderSourceOptions& options, const fs::path& folder) {
+  if (holdsScene(folder) || (options.level == 0 && options.memoryMiB == 0)) return;
+  throw Error(folder.string(), options.level != 0 ? "--lod" : "--memory-mib", "applies to scenes, and this is none",
+              "leave it out, or bake the model");
+}
 
 std::unique_ptr<RenderSource> openRenderSource(Device& device, const fs::path& folder,
                                                const RenderSourceOptions& options) {
-  if (fs::exists(folder / "tileset.json")) return openScene(device, folder, options);
+  if (holdsScene(folder)) return openScene(device, folder, options);
   return openModel(device, folder);
 }
 

@@ -31,6 +31,9 @@ struct RenderSourceOptions {
   double maximumScreenSpaceError = 0;  // for scenes: see SelectionSettings; 0: the finest everywhere
 };
 
+// Throws Error if the folder holds a model and the options are not the standard ones: they apply to scenes.
+void requireSceneFor(const RenderSourceOptions& options, const fs::path& folder);
+
 // Throws Error if the folder holds neither a model nor a scene, if the scene has no such level, or if its coarsest
 // level does not fit into memory. Warns if an image was rendered coarser than requested because memory was short. Keeps
 // a reference to `device`.

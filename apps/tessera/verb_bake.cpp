@@ -134,14 +134,15 @@ void addBakeVerb(CLI::App& app) {
       throw Error(flags->model, "", "is a model of " + name + ", which is not baked",
                   "train with --method " + namesOfMethods(isBaked, "or"));
     }
+    refuseFolderForScene(flags->scene);
     const BakeParameters parameters = flags->parameters.of(*method);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const Capture capture =
         readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);
     requireSameWorld(folder, capture);
     const std::unique_ptr<Baker> baker = method->openBaker(*device, flags->model, parameters);
-    Progress progress("baking", 0, "photos");
-    flags->options.onPhoto = [&](int64_t done, int64_t all) {
+    Progress progress("baking", 0, "steps");
+    flags->options.onStep = [&](int64_t done, int64_t all) {
       progress.setTotal(all);
       progress.update(done);
     };

@@ -1,5 +1,8 @@
 #include <fmt/format.h>
 
+#include <cmath>
+#include <cstdio>
+
 #include "apps/tessera/render_source.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
@@ -43,8 +46,9 @@ void addEvalVerb(CLI::App& app) {
   verb->callback([flags] {
     const Capture capture = readCapture(flags->capture);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<RenderSource> renderSource =
-        openRenderSource(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});
+    const RenderSourceOptions sourceOptions{flags->device.threads, flags->level, flags->memoryMiB};
+    requireSceneFor(sourceOptions, flags->model);
+    const std::unique_ptr<RenderSource> renderSource = openRenderSource(*device, flags->model, sourceOptions);
     EvaluateOptions options;
     options.split = *splitFromName(flags->split);
     renderSource->requireMatchingWorld(capture);
@@ -68,17 +72,28 @@ void addEvalVerb(CLI::App& app) {
     EvaluationReport report = evaluate(renderSource->renderer(), capture, options);
     report.coverage = renderSource->coverage();
     progress.finish();
-    const fs::path page = flags->report.empty() ? fs::path(flags->model) / "report.html" : fs::path(flags->report);
-    builder.write(page, report);
-    if (flags->json == "-") {
-      fmt::print("{}\n", toJson(report));
-      return;
+    if (!std::isfinite(report.psnr)) {
+      warn("no pixel of these views could be compared: {} shows nothing in them, or masks exclude all", flags->model);
     }
-    if (!flags->json.empty()) writeFileAtomically(flags->json, toJson(report) + "\n");
-    fmt::print("{} views: PSNR {:.2f} dB, SSIM {:.4f}{}, exposure {}, {:.2f} s a frame on {}\nreport: {}\n",
-               report.views.size(), report.psnr, report.ssim,
-               report.lpips ? fmt::format(", LPIPS ({}) {:.4f}", report.lpipsNet, *report.lpips) : "",
-               exposureName(report.fitExposure), report.secondsPerFrame, report.device, page.string());
+    // The report comes last: if it cannot be written, the numbers are not lost.
+    const bool isJsonAlone = flags->json == "-";
+    if (isJsonAlone) {
+      fmt::print("{}\n", toJson(report));
+    } else {
+      if (!flags->json.empty()) writeFileAtomically(flags->json, toJson(report) + "\n");
+      fmt::print("{} views: PSNR {:.2f} dB, SSIM {:.4f}{}, exposure {}, {:.2f} s a frame on {}\n", report.views.size(),
+                 report.psnr, report.ssim,
+                 report.lpips ? fmt::format(", LPIPS ({}) {:.4f}", report.lpipsNet, *report.lpips) : "",
+                 exposureName(report.fitExposure), report.secondsPerFrame, report.device);
+    }
+    std::fflush(stdout);
+    const fs::path page = flags->report.empty() ? fs::path(flags->model) / "report.html" : fs::path(flags->report);
+    try {
+      builder.write(page, report);
+    } catch (const Error& error) {
+      throw Error(error.subject(), error.place(), error.reason(), "name another file with --report");
+    }
+    if (!isJsonAlone) fmt::print("report: {}\n", page.string());
   });
 }
 

@@ -24,8 +24,9 @@ void addImportVerb(CLI::App& app) {
           "photos held out for evaluation: every:N, list:FILE, none, or auto (the source's own split, else every:8)")
       ->capture_default_str();
   verb->add_option(
-      "--mask-command", flags->options.maskCommand,
-      "program that writes the mask of a photo, black where it is to be ignored: 'segment.py {photo} {mask}'");
+          "--mask-command", flags->options.maskCommand,
+          "program that writes the mask of a photo, black where it is to be ignored: 'segment.py {photo} {mask}'")
+      ->check([](const std::string& command) { return std::string(command.empty() ? "names no program" : ""); });
   verb->add_option("--threads", flags->options.threads, "CPU threads; 0: all cores")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));

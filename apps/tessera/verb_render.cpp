@@ -52,8 +52,9 @@ void addRenderVerb(CLI::App& app) {
     RenderViewsOptions options;
     if (!flags->size.empty()) parsePictureSize(flags->size, options.width, options.height);
     const std::unique_ptr<Device> device = makeDevice(flags->device);
-    const std::unique_ptr<RenderSource> renderSource =
-        openRenderSource(*device, flags->model, {flags->device.threads, flags->level, flags->memoryMiB});
+    const RenderSourceOptions sourceOptions{flags->device.threads, flags->level, flags->memoryMiB};
+    requireSceneFor(sourceOptions, flags->model);
+    const std::unique_ptr<RenderSource> renderSource = openRenderSource(*device, flags->model, sourceOptions);
     std::vector<NamedView> views;
     if (!flags->path.empty()) {
       const CameraPath path = readCameraPath(flags->path, flags->dataparserTransforms);

@@ -86,6 +86,11 @@ bool trainsPartsAlone(const Method& method) {
   return method.partsAlone;
 }
 
+void takeMethodOfResumedRun(TrainFlags& flags) {
+  const auto manifest = flags.loop.resume ? ModelFolder(flags.model).manifest() : std::nullopt;
+  if (manifest && findMethod(manifest->method) != nullptr) flags.method = manifest->method;
+}
+
 // Throws Error if the model to resume is of another method, whose settings this method could not interpret.
 void requireSameMethod(const TrainFlags& flags) {
   const auto manifest = flags.loop.resume ? ModelFolder(flags.model).manifest() : std::nullopt;
@@ -158,12 +163,14 @@ void addTrainVerb(CLI::App& app) {
                                                     flags->method, firstMethod(trainsInBlocks).name));
   verb->add_option("capture", flags->capture, "capture folder")->required();
   verb->add_option("model", flags->model, "model folder to write")->required();
-  verb->add_option("--method", flags->method, "representation")
-      ->capture_default_str()
-      ->check(CLI::IsMember(namesOfAllMethods()));
-  CLI::Option* steps = verb->add_option("--steps", flags->loop.steps, "training steps")
-                           ->default_str(fmt::format("{}, or what the resumed run had planned", kDefaultSteps))
-                           ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
+  const CLI::Option* const method = verb->add_option("--method", flags->method, "representation")
+                                        ->default_str(fmt::format("{}, or that of the resumed run", flags->method))
+                                        ->check(CLI::IsMember(namesOfAllMethods()));
+  CLI::Option* steps =
+      verb->add_option("--steps", flags->loop.steps,
+                       fmt::format("training steps; of --method {}: of each block", namesOfMethods(trainsPartsAlone)))
+          ->default_str(fmt::format("{}, or what the resumed run had planned", kDefaultSteps))
+          ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
   verb->add_option("--minutes", flags->loop.minutes,
                    "train for about this long; the number of steps is fixed early in training")
       ->check(amount(1e-3, 1e7))
@@ -185,7 +192,8 @@ void addTrainVerb(CLI::App& app) {
                    fmt::format("of --method {}: train only these, separated by commas, as block_0_1,background; other "
                                "processes may train others. coarse: only what all need first",
                                namesOfMethods(trainsPartsAlone)))
-      ->delimiter(',');
+      ->delimiter(',')
+      ->transform([](std::string name) { return CLI::detail::trim(name); });
   verb->add_option("--memory-mib", flags->memoryMiB,
                    ofBlocks + "memory for which to plan blocks and photos; default: the machine's")
       ->check(amount(1, 1e9));
@@ -197,7 +205,8 @@ void addTrainVerb(CLI::App& app) {
       ->check(amount(0, 1e9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);
-  verb->callback([flags] {
+  verb->callback([flags, method] {
+    if (method->count() == 0) takeMethodOfResumedRun(*flags);
     catchInterrupts();
     flags->loop.stopRequested = interrupted;
     const std::unique_ptr<Device> device = makeDevice(flags->device);

@@ -29,7 +29,7 @@ class LevelBaker : public Baker {
     const int64_t photos = static_cast<int64_t>(capture.photosIn(Split::train).size());
     for (uint32_t level = 0; level < levels_; ++level) {
       BakeOptions ofLevel = options;
-      ofLevel.onPhoto = [&](int64_t done, int64_t) { options.onPhoto(level * photos + done, levels_ * photos); };
+      ofLevel.onStep = [&](int64_t done, int64_t) { options.onStep(level * photos + done, levels_ * photos); };
       ofLevel.stride <<= level;  // texels are twice as large, so half as many rays per axis pass through each
       if (level > 0) next_ = models_(level);
       bakeLevel(*next_, level, capture, ofLevel, sink);

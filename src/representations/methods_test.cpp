@@ -179,7 +179,7 @@ TEST(Methods, TrainDescribeDrawAndBakeTheirModels) {
     BakeOptions baking;
     baking.stride = 16;
     int64_t done = 0, all = 0;
-    baking.onPhoto = [&](int64_t now, int64_t of) {
+    baking.onStep = [&](int64_t now, int64_t of) {
       EXPECT_EQ(now, ++done);
       all = of;
     };

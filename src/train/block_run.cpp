@@ -37,7 +37,7 @@ double BlockRunOptions::bytesForPhotos() const {
 
 BlockRun openBlockRun(const Capture& capture, const fs::path& model, const BlockRunOptions& options,
                       const PartitionRequirements& partitionRequirements) {
-  refuseCaptureFolder(model);
+  refuseFolderForModel(model);
   const ModelFolder folder(model);
   refuseTrainedModel(folder, options.loop);
   const bool goesOn = folder.manifest().has_value();

@@ -56,7 +56,8 @@ std::optional<ModelManifest> ModelFolder::manifest() const {
   for (const std::string& file : manifest.files) {
     const std::optional<fs::path> inside = resolveInside(root_, file);
     if (!inside || !fs::exists(*inside)) {
-      throw Error(path.string(), "files", "names '" + file + "', which is not there", "train again without --resume");
+      throw Error(path.string(), "files", "names '" + file + "', which is not there",
+                  "restore the file, or train into another folder");
     }
   }
   return manifest;

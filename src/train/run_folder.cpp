@@ -11,9 +11,27 @@
 
 namespace tessera {
 
-void refuseCaptureFolder(const fs::path& model) {
-  if (!fs::exists(model / "transforms.json")) return;
-  throw Error(model.string(), "", "holds a capture or photos", "name another folder for the model");
+namespace {
+
+void refuseFolderWith(const fs::path& folder, const char* file, const char* contents, const char* purpose) {
+  if (!fs::exists(folder / file)) return;
+  throw Error(folder.string(), "", std::string("holds ") + contents,
+              std::string("name another folder for the ") + purpose);
+}
+
+constexpr const char *kCaptureFile = "transforms.json", *kCapture = "a capture or photos";
+
+}  // namespace
+
+void refuseFolderForModel(const fs::path& folder) {
+  refuseFolderWith(folder, kCaptureFile, kCapture, "model");
+  refuseFolderWith(folder, "tileset.json", "a scene", "model");
+}
+
+void refuseFolderForScene(const fs::path& folder) {
+  refuseFolderWith(folder, kCaptureFile, kCapture, "scene");
+  refuseFolderWith(folder, "manifest.json", "a model", "scene");
+  refuseFolderWith(folder, "blocks.json", "a model", "scene");
 }
 
 // The rest of what defines a run is in blocks.json (the capture) and manifest.json (the number of steps).

@@ -7,8 +7,10 @@
 
 namespace tessera {
 
-// Throws Error if `model` holds a capture or photos: a model written there would be mistaken for part of it.
-void refuseCaptureFolder(const fs::path& model);
+// Throw Error if a folder that a model, or a scene, is to be written to holds something else: a capture or photos, a
+// scene, a model. Programs that open the folder would take one for the other.
+void refuseFolderForModel(const fs::path& folder);
+void refuseFolderForScene(const fs::path& folder);
 
 // Returns the first lines of config.toml, comments with the command that reproduces the run. `flags`: further flags of
 // that command, as " --grid blocks.json". `lengthOfMinutes`: the flag in place of --minutes, whose number of steps

@@ -81,6 +81,11 @@ Start startingPoint(TrainableModel& trainable, const ModelFolder& folder, const 
     folder.cutMetrics(-1);
   }
   if (options.steps > 0 && options.minutes <= 0) {
+    if (state.step > options.steps) {
+      throw Error(folder.root().string(), "manifest.json",
+                  fmt::format("the model has been trained for {} steps, more than {}", state.step, options.steps),
+                  "resume with as many --steps or more, or without --steps");
+    }
     state.plannedSteps = options.steps;
     return {state, 0};
   }

@@ -64,7 +64,8 @@ struct TrainingResult {
 void refuseTrainedModel(const ModelFolder& folder, const TrainingLoopOptions& options);
 
 // Trains until all steps are done or a stop is requested. Throws Error, with the step, if a loss or a parameter is not
-// finite (the checkpoint before it is kept), and as refuseTrainedModel does.
+// finite (the checkpoint before it is kept), if the model has been trained for more than options.steps, and as
+// refuseTrainedModel does.
 TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder, const TrainingLoopOptions& options);
 
 }  // namespace tessera

@@ -201,6 +201,14 @@ TEST_F(TrainingLoop, DoesNothingWhenResumedAtItsEnd) {
   EXPECT_EQ(second.state, first.state);
 }
 
+TEST_F(TrainingLoop, RefusesFewerStepsThanHaveBeenDone) {
+  FakeTrainableModel first, second;
+  runTraining(first, folder_, options(3));
+  EXPECT_THROW(runTraining(second, folder_, options(2, true)), Error);
+  EXPECT_TRUE(second.steps.empty());
+  EXPECT_EQ(folder_.manifest()->plannedSteps, 3);
+}
+
 TEST_F(TrainingLoop, StartsAnewWhenThereIsNothingToResume) {
   FakeTrainableModel trainable;
   EXPECT_TRUE(runTraining(trainable, folder_, options(3, true)).finished);

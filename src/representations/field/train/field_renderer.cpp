@@ -105,9 +105,10 @@ RoundCounts FieldRenderer::renderPiece(const ImageRays::Piece& piece) {
   return counts;
 }
 
-void FieldRenderer::cullUnseen(const Capture& capture, const CullOptions& options) {
+void FieldRenderer::cullUnseen(const Capture& capture, const CullOptions& options,
+                               const std::function<void(int64_t done, int64_t all)>& onPhoto) {
   SeenCells seen(*this, options);
-  PhotoVisitor(capture, model_.frame(), kRays, seen).visitAll(options.stride, {}, [](int64_t, int64_t) {});
+  PhotoVisitor(capture, model_.frame(), kRays, seen).visitAll(options.stride, {}, onPhoto);
   const auto cells = static_cast<uint32_t>(model_.space().gridResolution);
   for (int i = 0; i < options.dilation; ++i) seen.marked = dilateCells(seen.marked, cells);
   std::vector<uint32_t> bits = model_.occupancy().bitWords();

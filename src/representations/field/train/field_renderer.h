@@ -20,7 +20,9 @@ class FieldRenderer final : public ViewRenderer {
 
   // From now on, renders only those occupied cells that the training photos see through unmasked pixels (CullOptions).
   // Throws Error if a mask cannot be read.
-  void cullUnseen(const Capture& capture, const CullOptions& options);
+  void cullUnseen(
+      const Capture& capture, const CullOptions& options,
+      const std::function<void(int64_t done, int64_t all)>& onPhoto = [](int64_t, int64_t) {});
 
   // The cells that rays march through, as OccupancyGrid::bits.
   Slice<const uint32_t> cells() const { return seenCells_.size() > 0 ? seenCells_.all() : model_.occupancy().bits(); }

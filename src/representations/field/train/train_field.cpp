@@ -8,7 +8,7 @@ namespace tessera {
 constexpr double kPhotoMemoryFraction = 0.5;  // of the usable memory
 
 TrainingResult trainField(Device& device, const Capture& capture, const fs::path& model, TrainFieldOptions options) {
-  refuseCaptureFolder(model);
+  refuseFolderForModel(model);
   const ModelFolder folder(model);
   options.loop.method = "field";
   const bool goingOn = options.loop.resume && folder.manifest().has_value();

@@ -290,7 +290,7 @@ std::vector<OccupancyBits> findSeenCells(HashModel& model, const Capture& captur
   VisibilityMarker finder(model, options, seen);
   const bool backgroundBlock = model.space().blocks() > model.space().cells();
   PhotoVisitor(capture, model.frame(), kBakingRays, finder)
-      .visitAll(options.stride, {backgroundBlock, true}, options.onPhoto);
+      .visitAll(options.stride, {backgroundBlock, true}, options.onStep);
   for (OccupancyBits& bits : seen) {
     for (int i = 0; i < options.dilation; ++i) bits = dilated(bits);
   }

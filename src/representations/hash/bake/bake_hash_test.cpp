@@ -329,7 +329,7 @@ TEST_F(BakedScenes, RejectModelsThatMixByANetworkBeforeVisitingPhotos) {
   const CubeScene scene;
   TrainedHashCube trained(scene, config, cubeGrid(), 0);
   BakeHashOptions options;
-  options.onPhoto = [](int64_t, int64_t) { ADD_FAILURE() << "visited a photo"; };
+  options.onStep = [](int64_t, int64_t) { ADD_FAILURE() << "visited a photo"; };
   EXPECT_THROW(bakeHash(onlyModel(trained, folder_), 1, scene.capture(), folder_ / "scene", options), Error);
   EXPECT_THROW(bakeHashGroup(trained.model(), {0}, {OccupancyBits(16)}), Error);
 }

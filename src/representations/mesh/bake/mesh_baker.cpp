@@ -1,7 +1,6 @@
 #include "representations/mesh/bake/mesh_baker.h"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <bit>
@@ -79,36 +78,31 @@ class MeshBaker final : public Baker {
 
   // Parts are in memory one after another, blocks row by row: of groups of blocks, only baked patches wait for others.
   void bake(const Capture& given, const BakeOptions& options, ContentSink& sink) override {
-    warnOfUnfinishedParts();
+    mesh_.warnOfUnfinishedParts("go on with tessera train ... --resume, then bake again");
     options_ = options;
     sink_ = &sink;
     placeOn(frame_, grid_);
     frame_.georeference = given.geo;
     uint32_t levels = 1;
     for (const StoredMesh::Part& each : mesh_.parts()) levels = std::max(levels, each.levels);
-    passes_ = 0;
-    for (const StoredMesh::Part& each : mesh_.parts())
-      for (uint32_t level = 0; level < (each.part.isBackground() ? 1 : levels); ++level)
-        passes_ += isExtracted(each, level) ? 1 : 0;
+    int64_t passes = 0, extractions = 0;
+    for (const StoredMesh::Part& each : mesh_.parts()) {
+      for (uint32_t level = 0; level < (each.part.isBackground() ? 1 : levels); ++level) {
+        ++passes;
+        extractions += isExtracted(each, level) ? 1 : 0;
+      }
+    }
     Capture capture = applyTransientMasks(given, mesh_.folder());
-    if (passes_ > 0)  // triangles are what the photos of the training show
+    if (extractions > 0)  // triangles are what the photos of the training show
       capture = addViewsBetween(std::move(capture), mesh_.folder(), static_cast<uint64_t>(mesh_.config().seed));
-    photosToCome_ = static_cast<int64_t>(capture.photosIn(Split::train).size());
+    stepsDone_ = 0;
+    steps_ = passes + extractions * static_cast<int64_t>(capture.photosIn(Split::train).size());
     for (uint32_t level = 0; level < levels; ++level) beginLevel(level);
     for (int block = 0; block < mesh_.grid().cells(); ++block) bakeBlock(capture, block);
     if (const StoredMesh::Part* outside = findPart(-1)) bakeBackground(capture, *outside);
   }
 
  private:
-  void warnOfUnfinishedParts() const {
-    const std::vector<std::string> unfinished = mesh_.findUnfinishedParts();
-    if (unfinished.empty()) return;
-    warn(
-        "{}: {}; the scene shows these places unfinished or empty; go on with tessera train ... --resume, then bake "
-        "again",
-        mesh_.folder().string(), fmt::join(unfinished, ", "));
-  }
-
   // Throws Error for what would be refused when the scene is written, after everything has been baked.
   void requireValidGrid() const {
     const std::string remedy =
@@ -169,6 +163,7 @@ class MeshBaker final : public Baker {
     std::map<uint32_t, std::vector<uint32_t>> patchesOfGroup;
     for (const uint32_t group : groups) patchesOfGroup[group];
     const BakedPatches baked = bakePart(capture, model, level);
+    reportStep();
     for (uint32_t patch = 0; patch < baked.patches(); ++patch) {
       const Vec3d at = sceneFromPart(model) * baked.centre(patch);
       patchesOfGroup[groupAt(growing.groups, model.part().block, at)].push_back(patch);
@@ -183,6 +178,7 @@ class MeshBaker final : public Baker {
     const std::unique_ptr<MeshModel> loaded = mesh_.load(outside.part, MeshUse::baking);
     MeshModel& model = *loaded;
     const BakedPatches baked = bakePart(capture, model, 0);
+    reportStep();
     GrowingContent growing;
     growing.content.isBackground = true;
     growing.content.skyEdge = MeshModel::kSkyResolution;
@@ -198,6 +194,8 @@ class MeshBaker final : public Baker {
     for (const auto& [octave, patches] : byDistance) addPatches(baked, patches, model, nullptr, growing);
     finish(0, std::nullopt, growing);
   }
+
+  void reportStep() { options_.onStep(++stepsDone_, steps_); }
 
   // The part of a block, -1: of the outside; null if it has not been trained.
   const StoredMesh::Part* findPart(int block) const {
@@ -239,10 +237,8 @@ class MeshBaker final : public Baker {
     if (level == 0) extraction.droppedShare = model.config().droppedShare;
     extraction.dilation = model.config().dilation;
     if (model.part().isBackground()) extraction.raysPerCell = 0;
-    const FaceSet faces = extractFaces(model, level, capture, nullptr, extraction, [this](int64_t done, int64_t) {
-      options_.onPhoto(passesDone_ * photosToCome_ + done, passes_ * photosToCome_);
-    });
-    ++passesDone_;
+    const FaceSet faces =
+        extractFaces(model, level, capture, nullptr, extraction, [this](int64_t, int64_t) { reportStep(); });
     return bakePatches(model, level, faces, settings);
   }
 
@@ -414,7 +410,7 @@ class MeshBaker final : public Baker {
   BakeOptions options_;
   ContentSink* sink_ = nullptr;
   std::vector<GrowingLevel> growing_;
-  int64_t photosToCome_ = 0, passes_ = 0, passesDone_ = 0;
+  int64_t steps_ = 0, stepsDone_ = 0;  // BakeOptions::onStep
 };
 
 }  // namespace

@@ -52,6 +52,7 @@ void FinalStage::begin() {
 
 void FinalStage::extract() {
   const MeshConfig& config = model_.config();
+  inform("{}: looking for the triangles that photos show", model_.part().name);
   if (model_.levels() == 1)  // short trainings end before coarse levels are trained
     model_.addCoarseLevels(mix64(static_cast<uint64_t>(config.seed)));
   ExtractionSettings extraction;
@@ -65,7 +66,10 @@ void FinalStage::extract() {
   MeshAtlas atlas;
   atlas.patchEdge = static_cast<uint32_t>(config.patchTexels);
   atlas.faces = extractFaces(model_, 0, capture_, &tiles_, extraction);
-  if (atlas.faces.count() == 0) warn("{}: no triangle is opaque enough to be kept", model_.part().name);
+  if (atlas.faces.count() == 0) {
+    warn("{}: no triangle is opaque enough to be kept, so its place will be empty in a scene; train for more steps",
+         model_.part().name);
+  }
   atlas.ranges.resize(2 * MeshField::kFeatures);  // begin() finds them
   model_.setAtlas(std::move(atlas));
   updateCoverage("before");
@@ -74,6 +78,7 @@ void FinalStage::extract() {
 void FinalStage::fitCoarserLevel(uint32_t level) {
   constexpr int kRaysAcrossTexels = 2;  // of those that find faces
   constexpr double kDroppedShare = 0.01;
+  inform("{}: looking for those of level {}", model_.part().name, level);
   ExtractionSettings extraction;
   extraction.photoStride = std::max(1, findPhotoStride(pixelWidth_, model_.level(level).domain()) / kRaysAcrossTexels);
   extraction.raysPerCell *= kRaysAcrossTexels;

@@ -79,19 +79,25 @@ double MeshStart::pixels() const {
   return sum;
 }
 
-SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool seesPoints)
+SurfaceSurvey::SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool seesPoints, const OnPhoto& onPhoto)
     : frame_(coarse.frame()), space_(coarse.space()), photoCount_(capture.photos.size()) {
   FieldRenderer renderer(coarse);
+  constexpr double kMaxPoints = 1 << 22;
   const int edge = tileEdge(capture);
-  for (const int photo : capture.photosIn(Split::train)) {
+  const double strideOfPoints = strideFor(capture, kMaxPoints, kPhotoStride);
+  const std::vector<int> photos = capture.photosIn(Split::train);
+  const int64_t all = 2 * static_cast<int64_t>(photos.size());  // cullUnseen looks at them again
+  int64_t done = 0;
+  for (const int photo : photos) {
     const Photo& of = capture.photos[photo];
     addSights(photo, capture.cameras[of.camera], of.worldFromCamera, edge, renderer);
+    if (seesPoints) addSurface(of, capture.cameras[of.camera], strideOfPoints, renderer);
+    onPhoto(++done, all);
   }
-  if (seesPoints) addSurface(capture, renderer);
   CullOptions options;
   constexpr double kMaxRays = 1 << 24;
   options.stride = static_cast<int>(std::ceil(strideFor(capture, kMaxRays, kPhotoStride)));
-  renderer.cullUnseen(capture, options);
+  renderer.cullUnseen(capture, options, [&](int64_t culled, int64_t) { onPhoto(done + culled, all); });
   cells_ = coarse.device().read(renderer.cells());
 }
 
@@ -127,17 +133,12 @@ void SurfaceSurvey::addSights(int photo, const Camera& camera, const Pose& pose,
   }
 }
 
-void SurfaceSurvey::addSurface(const Capture& capture, FieldRenderer& renderer) {
-  constexpr double kMaxPoints = 1 << 22;
-  const double stride = strideFor(capture, kMaxPoints, kPhotoStride);
-  for (const int photo : capture.photosIn(Split::train)) {
-    const Camera& camera = capture.cameras[capture.photos[photo].camera];
-    const CoarseView view(renderer, strideCamera(camera, stride), capture.photos[photo].worldFromCamera);
-    for (int y = 0; y < view.camera().height; ++y) {
-      for (int x = 0; x < view.camera().width; ++x) {
-        if (const auto surface = view.surfaceAt(x, y, kSolidOpacity))
-          surface_.push_back(frame_.sceneFromWorld(surface->at).cast<float>());
-      }
+void SurfaceSurvey::addSurface(const Photo& photo, const Camera& camera, double stride, FieldRenderer& renderer) {
+  const CoarseView view(renderer, strideCamera(camera, stride), photo.worldFromCamera);
+  for (int y = 0; y < view.camera().height; ++y) {
+    for (int x = 0; x < view.camera().width; ++x) {
+      if (const auto surface = view.surfaceAt(x, y, kSolidOpacity))
+        surface_.push_back(frame_.sceneFromWorld(surface->at).cast<float>());
     }
   }
 }

@@ -4,6 +4,7 @@
 
 #include "representations/field/train/field_model.h"
 #include "representations/mesh/train/mesh_part.h"
+#include "representations/mesh/train/stage_progress.h"
 #include "train/photo_tiles.h"
 
 namespace tessera {
@@ -33,8 +34,8 @@ struct MeshStart {
 // What the training photos see of the coarse field, in the world.
 class SurfaceSurvey {
  public:
-  // `seesPoints`: for findDisplacements, which takes as many rays again.
-  SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool seesPoints);
+  // `seesPoints`: for findDisplacements, which takes as many rays again. `onPhoto` counts the photos of all passes.
+  SurfaceSurvey(const Capture& capture, FieldModel& coarse, bool seesPoints, const OnPhoto& onPhoto = kNobodyWatches);
 
   // Finds the cells of `domain`, of the part's finest level, in which there may be a surface, and the tiles whose
   // middles show one in the block or up to half of its margin beside it; outside: the tiles that show the sky, or a
@@ -59,7 +60,7 @@ class SurfaceSurvey {
   };
 
   void addSights(int photo, const Camera& camera, const Pose& pose, int edge, FieldRenderer& renderer);
-  void addSurface(const Capture& capture, FieldRenderer& renderer);
+  void addSurface(const Photo& photo, const Camera& camera, double stride, FieldRenderer& renderer);
   // [cells of the lattice]: whether there may be a surface.
   std::vector<bool> findCells(const MeshPart& part, const OctahedraDomain& domain) const;
   // Whether photos see something in a box, in units of the coarse field's cells.

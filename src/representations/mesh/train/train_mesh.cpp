@@ -7,6 +7,7 @@
 #include <bit>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -141,15 +142,25 @@ uint64_t viewSeed(const MeshConfig& config) {
   return static_cast<uint64_t>(config.seed);
 }
 
-// Makes what the parts are trained with beside the photos, unless it has been made.
-void compareWithCoarseField(Device& device, const Capture& capture, const fs::path& model, const MeshConfig& config) {
+// Makes what the parts are trained with beside the photos, unless it has been made. Throws StageStopped.
+void compareWithCoarseField(Device& device, const Capture& capture, const fs::path& model,
+                            const TrainMeshOptions& options) {
+  const MeshConfig& config = options.config;
   const bool needsMasks = config.leavesTransientsOut() && !transientFolder(model).isComplete();
   // Without a background block, photos may be transparent, and views by the coarse field are not.
   const bool needsViews = config.enoughPhotos > 0 && config.hasBackground() && !viewsFolder(model).isComplete();
   if (!needsMasks && !needsViews) return;
   const auto coarse = loadFieldModel(device, coarseFolder(model).root());
-  if (needsMasks) makeTransientMasks(capture, *coarse, model);
-  if (needsViews) makeViewsBetween(capture, *coarse, model, config.enoughPhotos, viewSeed(config));
+  if (needsMasks) {
+    StageProgress progress("looking for what moves", options.loop);
+    makeTransientMasks(capture, *coarse, model, progress.onPhoto());
+    progress.finish();
+  }
+  if (needsViews) {
+    StageProgress progress("looking for places in few photos", options.loop);
+    makeViewsBetween(capture, *coarse, model, config.enoughPhotos, viewSeed(config), progress.onPhoto());
+    progress.finish();
+  }
 }
 
 // Writes config.toml of a run. With --minutes, each part has a number of steps of its own.
@@ -200,9 +211,36 @@ std::vector<PlannedPart> planParts(const Capture& capture, const std::vector<Mes
   return planned;
 }
 
-}  // namespace
+// The steps of a part in a run of `steps` for each block; 0: of kDefaultSteps.
+int64_t stepsOfPart(const MeshConfig& config, const MeshPart& part, int64_t steps) {
+  const int64_t ofBlock = steps > 0 ? steps : kDefaultSteps;
+  if (!part.isBackground()) return ofBlock;
+  return std::max<int64_t>(1, std::llround(static_cast<double>(ofBlock) * config.backgroundShare));
+}
 
-TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& model, TrainMeshOptions options) {
+// Returns the sum of these parts if nothing is left to train of them.
+std::optional<TrainingResult> findFinished(const fs::path& model, const std::vector<MeshPart>& parts,
+                                           const TrainMeshOptions& options) {
+  const std::optional<std::vector<std::string>> shown = readShownParts(model);
+  if (!shown) return std::nullopt;
+  TrainingResult sum;
+  sum.finished = true;
+  for (const MeshPart& part : parts) {
+    if (std::find(shown->begin(), shown->end(), part.name) == shown->end()) continue;
+    const std::optional<ModelManifest> manifest = partFolder(model, part).manifest();
+    if (!manifest || manifest->plannedSteps == 0 || manifest->step < manifest->plannedSteps) return std::nullopt;
+    const bool isAsLong = options.loop.minutes > 0 || options.loop.steps == 0 ||
+                          manifest->step == stepsOfPart(options.config, part, options.loop.steps);
+    if (!isAsLong) return std::nullopt;
+    sum.step += manifest->step;
+    sum.plannedSteps += manifest->plannedSteps;
+  }
+  return sum;
+}
+
+// Throws StageStopped.
+TrainingResult trainCoarseFieldAndParts(Device& device, const Capture& given, const fs::path& model,
+                                        TrainMeshOptions options) {
   const Stopwatch stopwatch;
   MeshConfig& config = options.config;
   config.check();
@@ -222,6 +260,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
     if (!options.loop.resume) transientFolder(model).remove();
     if (!options.loop.resume) viewsFolder(model).remove();
     if (!options.loop.resume) fs::remove(model / "run.json");
+    fs::remove(model / "shown.json");
     keepLength(model, options.loop);
     writeConfig(device, model, config, options.loop);
     run.folder.writePlacement({{}, run.grid, given.sourceFromWorld, given.root, trainingNames(given)}, "mesh");
@@ -229,8 +268,8 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
   } else {
     keepLength(model, options.loop);
   }
-  if (!trainCoarseField(device, given, model, run.grid, options)) return {};
-  compareWithCoarseField(device, given, model, config);
+  if (!trainCoarseField(device, given, model, run.grid, options)) throw StageStopped();
+  compareWithCoarseField(device, given, model, options);
   const Capture capture = addViewsBetween(config.leavesTransientsOut() ? applyTransientMasks(given, model) : given,
                                           model, viewSeed(config));
   // The budget counts the views between the photos, too, and decides on the order in which photos are drawn.
@@ -243,12 +282,19 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
   const auto isRequested = [&](const std::string& name) {
     return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
   };
+  std::vector<MeshPart> requested;
+  std::copy_if(parts.begin(), parts.end(), std::back_inserter(requested),
+               [&](const MeshPart& part) { return isRequested(part.name); });
   TrainingResult sum;
   sum.finished = true;
-  if (!options.only.empty() &&
-      std::none_of(parts.begin(), parts.end(), [&](const MeshPart& part) { return isRequested(part.name); })) {
-    return sum;  // only the coarse field
+  if (requested.empty()) {  // only the coarse field
+    const ModelManifest coarse = requireManifest(coarseFolder(model));
+    sum.step = coarse.step;
+    sum.plannedSteps = coarse.plannedSteps;
+    return sum;
   }
+  if (run.goesOn)
+    if (const auto finished = findFinished(model, requested, options)) return *finished;
 
   // Vertices start at the surface only in blocks whose training begins now.
   const auto startsAtSurface = [&](const MeshPart& part) {
@@ -259,7 +305,9 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
   fs::path coarseFile;
   {
     const auto coarse = loadFieldModel(device, coarseFolder(model).root());
-    survey.emplace(capture, *coarse, std::any_of(parts.begin(), parts.end(), startsAtSurface));
+    StageProgress progress("looking for surfaces", options.loop);
+    survey.emplace(capture, *coarse, std::any_of(parts.begin(), parts.end(), startsAtSurface), progress.onPhoto());
+    progress.finish();
     planned = planParts(capture, parts, *survey, config);
     survey->forgetTiles();
     coarseFile = coarseFolder(model).root() / requireManifest(coarseFolder(model)).files.at(0);
@@ -285,8 +333,7 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
       loop.minutes = std::max(kLeastMinutes, left * plan.share / shareLeft);
       if (!plan.part.isBackground()) loop.minutes = minutesOfSteps(config, loop.minutes);
     } else if (plan.part.isBackground()) {
-      const int64_t steps = loop.steps > 0 ? loop.steps : kDefaultSteps;
-      loop.steps = std::max<int64_t>(1, std::llround(static_cast<double>(steps) * config.backgroundShare));
+      loop.steps = stepsOfPart(config, plan.part, loop.steps);
     }
     shareLeft -= plan.share;
     const double pixels = plan.start.pixels(), through = plan.start.through.total();
@@ -319,7 +366,23 @@ TrainingResult trainMesh(Device& device, const Capture& given, const fs::path& m
   }
   sum.samplesPerSecond = samples / std::max(1e-9, sum.seconds);
   sum.samplesPerRay = samples / std::max(1.0, rays);
+  sum.seconds = 60 * stopwatch.minutes();  // with all that comes before the steps of parts
   return sum;
+}
+
+}  // namespace
+
+TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path& model, TrainMeshOptions options) {
+  try {
+    return trainCoarseFieldAndParts(device, capture, model, std::move(options));
+  } catch (const StageStopped&) {
+    TrainingResult reached;
+    if (const std::optional<ModelManifest> manifest = ModelFolder(model).manifest()) {
+      reached.step = manifest->step;
+      reached.plannedSteps = manifest->plannedSteps;
+    }
+    return reached;
+  }
 }
 
 }  // namespace tessera

@@ -65,12 +65,14 @@ TEST_F(TrainMesh, EndsWithTheSameBytesHoweverOftenItIsStopped) {
   for (bool finished = false; !finished; ++stops) {
     ASSERT_LT(stops, 20);
     int asked = 0;
-    options.loop.stopRequested = [&] { return ++asked > 11; };
+    options.loop.stopRequested = [&] { return ++asked > 11 * (stops + 1); };
     finished = train("stopped", options).finished;
     options.loop.resume = true;
     options.loop.steps = 0;  // as the run had planned
   }
   EXPECT_GT(stops, 4);
+  options.loop.stopRequested = [] { return true; };
+  EXPECT_TRUE(train("stopped", options).finished) << "there is nothing to do";
   EXPECT_EQ(lastCheckpoints(scene / "stopped"), whole);
   EXPECT_EQ(requireManifest(ModelFolder(scene / "stopped")).step, 2 * kSteps + kSteps * 15 / 100);
 }
@@ -100,7 +102,8 @@ TEST_F(TrainMesh, StatesWhatIsLeftToTrain) {
   options.loop.resume = true;
   options.only = {"block_0_0"};
   int asked = 0;
-  options.loop.stopRequested = [&] { return ++asked > 6; };
+  const int looks = 2 * static_cast<int>(scene.capture().photosIn(Split::train).size());  // for surfaces
+  options.loop.stopRequested = [&] { return ++asked > looks + 6; };
   EXPECT_FALSE(train("mesh", options).finished);
   EXPECT_THAT(findUnfinished(),
               ElementsAre("block_0_0 has been trained for 6 of 20 steps", "background has not been trained"));
@@ -109,14 +112,37 @@ TEST_F(TrainMesh, StatesWhatIsLeftToTrain) {
   options.only = {};
   EXPECT_TRUE(train("mesh", options).finished);
   EXPECT_THAT(findUnfinished(), ElementsAre());
+  const auto whole = lastCheckpoints(scene / "mesh");
   fs::remove_all(scene / "mesh" / "parts" / "block_1_0");
-  writeMeshManifest(scene / "mesh", {});
   EXPECT_THAT(findUnfinished(), ElementsAre("block_1_0 has not been trained"));
+  EXPECT_TRUE(train("mesh", options).finished);
+  EXPECT_EQ(lastCheckpoints(scene / "mesh"), whole) << "a lost block is trained again";
+  fs::remove_all(scene / "mesh" / "parts" / "block_1_0");
   writeShownParts(scene / "mesh", {{"block_0_0", 0, {}, {1, 1, 1}}});
   EXPECT_THAT(findUnfinished(), ElementsAre()) << "photos show nothing of the others";
   for (const char* const text : {"", "{}", R"({"parts": "block_0_0"})", R"({"parts": [1]})"}) {
     writeFileAtomically(scene / "mesh" / "shown.json", text);
     EXPECT_THROW(findUnfinished(), Error) << text;
+  }
+}
+
+// The stages that look through the photos take minutes with large captures.
+TEST_F(TrainMesh, StopsWhileItLooksThroughThePhotos) {
+  TrainMeshOptions options = smallOptions();
+  options.only = {"coarse"};
+  options.config.transient = "auto";
+  EXPECT_TRUE(train("mesh", options).finished);
+  fs::remove_all(scene / "mesh" / "transient");
+  options.only = {};
+  options.loop.resume = true;
+  const int photos = static_cast<int>(scene.capture().photosIn(Split::train).size());
+  for (const int looks : {1, photos + 1}) {  // for what moves; for surfaces
+    int asked = 0;
+    options.loop.stopRequested = [&] { return ++asked >= looks; };
+    EXPECT_FALSE(train("mesh", options).finished);
+    EXPECT_EQ(asked, looks) << "it stops at the photo at which it is asked to";
+    EXPECT_EQ(fs::exists(scene / "mesh" / "transient" / "masks.json"), looks > photos);
+    EXPECT_FALSE(fs::exists(scene / "mesh" / "parts" / "block_0_0" / "manifest.json"));
   }
 }
 

@@ -1,11 +1,13 @@
 #include "representations/mesh/train/trained_mesh.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/log.h"
 #include "train/block_frame.h"
 #include "train/run_folder.h"
 
@@ -27,19 +29,6 @@ void forEachCheckpoint(const fs::path& folder, const MeshConfig& config, const B
 
 fs::path shownFile(const fs::path& folder) {
   return folder / "shown.json";
-}
-
-// Returns nothing if the folder has no such record yet. Throws Error if it is malformed.
-std::optional<std::vector<std::string>> readShownParts(const fs::path& folder) {
-  const fs::path file = shownFile(folder);
-  if (!fs::exists(file)) return std::nullopt;
-  const nlohmann::json names = nlohmann::json::parse(readTextFile(file), nullptr, false);
-  const auto isName = [](const nlohmann::json& name) { return name.is_string(); };
-  if (!names.is_object() || !names.contains("parts") || !names["parts"].is_array() ||
-      !std::all_of(names["parts"].begin(), names["parts"].end(), isName)) {
-    throw Error(file.string(), "parts", "is missing, or not a list of names", "go on with tessera train ... --resume");
-  }
-  return names["parts"].get<std::vector<std::string>>();
 }
 
 }  // namespace
@@ -76,6 +65,12 @@ std::vector<std::string> StoredMesh::findUnfinishedParts() const {
   return unfinished;
 }
 
+void StoredMesh::warnOfUnfinishedParts(const std::string& remedy) const {
+  const std::vector<std::string> unfinished = findUnfinishedParts();
+  if (unfinished.empty()) return;
+  warn("{}: {}; these places are shown unfinished or empty; {}", folder_.string(), fmt::join(unfinished, ", "), remedy);
+}
+
 std::unique_ptr<MeshModel> StoredMesh::load(const MeshPart& part, MeshUse use) const {
   const ModelFolder trained = partFolder(folder_, part);
   const fs::path file = trained.root() / requireManifest(trained).files.at(0);
@@ -86,6 +81,7 @@ std::unique_ptr<MeshModel> StoredMesh::load(const MeshPart& part, MeshUse use) c
 
 TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder) {
   const StoredMesh stored(device, folder);
+  stored.warnOfUnfinishedParts("go on with tessera train ... --resume");
   TrainedMesh mesh{&device, stored.grid(), {}};
   for (const StoredMesh::Part& each : stored.parts()) mesh.parts.push_back(stored.load(each.part, MeshUse::rendering));
   return mesh;
@@ -108,10 +104,22 @@ void writeShownParts(const fs::path& folder, const std::vector<MeshPart>& parts)
   writeFileAtomically(shownFile(folder), nlohmann::json{{"parts", names}}.dump(2) + "\n");
 }
 
+std::optional<std::vector<std::string>> readShownParts(const fs::path& folder) {
+  const fs::path file = shownFile(folder);
+  if (!fs::exists(file)) return std::nullopt;
+  const nlohmann::json names = nlohmann::json::parse(readTextFile(file), nullptr, false);
+  const auto isName = [](const nlohmann::json& name) { return name.is_string(); };
+  if (!names.is_object() || !names.contains("parts") || !names["parts"].is_array() ||
+      !std::all_of(names["parts"].begin(), names["parts"].end(), isName)) {
+    throw Error(file.string(), "parts", "is missing, or not a list of names", "go on with tessera train ... --resume");
+  }
+  return names["parts"].get<std::vector<std::string>>();
+}
+
 void writeMeshManifest(const fs::path& folder, const std::vector<MeshPart>& parts) {
   ModelManifest sum;
   sum.method = "mesh";
-  // A manifest names files that exist.
+  // A manifest names files that exist. Those of parts are not named: if one is lost, the others remain usable.
   sum.files = {coarseFolder(folder).manifest() ? "coarse/manifest.json" : "blocks.json"};
   bool isPlanned = true;
   for (const MeshPart& part : parts) {
@@ -120,7 +128,6 @@ void writeMeshManifest(const fs::path& folder, const std::vector<MeshPart>& part
     if (!manifest) continue;
     sum.step += manifest->step;
     sum.plannedSteps += manifest->plannedSteps;
-    sum.files.push_back("parts/" + part.name + "/manifest.json");
   }
   if (!isPlanned) sum.plannedSteps = 0;
   ModelFolder(folder).writeManifest(sum);

@@ -40,6 +40,8 @@ class StoredMesh {
   // What is left to train, in words: the parts that photos show, and that have not been trained to their end. Throws
   // Error if shown.json is malformed.
   std::vector<std::string> findUnfinishedParts() const;
+  // Warns of them, with a remedy. Throws Error as findUnfinishedParts does.
+  void warnOfUnfinishedParts(const std::string& remedy) const;
 
   // Loads a part. Throws Error if its checkpoint is missing or malformed.
   std::unique_ptr<MeshModel> load(const MeshPart& part, MeshUse use) const;
@@ -59,7 +61,7 @@ struct TrainedMesh {
   std::vector<std::unique_ptr<MeshModel>> parts;  // those that have been trained, the outside last
 };
 
-// Throws Error as StoredMesh does.
+// Warns of unfinished parts. Throws Error as StoredMesh does.
 TrainedMesh loadTrainedMesh(Device& device, const fs::path& folder);
 
 // Returns how well the blocks cover what their photos show. Reads the checkpoints of all parts, one at a time. Throws
@@ -69,8 +71,10 @@ std::vector<SurfaceCoverage> readMeshCoverage(const fs::path& folder);
 // Writes the manifest of the mesh, which sums up those of these parts. Throws Error if it cannot be written.
 void writeMeshManifest(const fs::path& folder, const std::vector<MeshPart>& parts);
 
-// Writes shown.json: the parts that photos show something of. The others are never trained and have no triangles.
-// Throws Error if it cannot be written.
+// Write and read shown.json: the parts that photos show something of. The others are never trained and have no
+// triangles. Reading returns nothing before the first part is trained. Throw Error if the file cannot be written, or is
+// malformed.
 void writeShownParts(const fs::path& folder, const std::vector<MeshPart>& parts);
+std::optional<std::vector<std::string>> readShownParts(const fs::path& folder);
 
 }  // namespace tessera

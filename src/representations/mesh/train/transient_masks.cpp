@@ -95,7 +95,7 @@ ListedFolder transientFolder(const fs::path& mesh) {
   return ListedFolder(mesh / "transient", "masks");
 }
 
-ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse) {
+ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse, const OnPhoto& onPhoto) {
   ComparedPhotos compared;
   FieldRenderer renderer(coarse);
   std::vector<float> pixelWidths;
@@ -105,6 +105,7 @@ ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse) {
     const Camera& camera = capture.cameras[photo.camera];
     compared.photos.push_back(
         comparePhoto(photo, camera, findStride(camera, photos.size()), renderer, coarse.frame(), pixelWidths));
+    onPhoto(static_cast<int64_t>(compared.photos.size()), static_cast<int64_t>(photos.size()));
   }
   if (!pixelWidths.empty()) compared.pixelWidth = upperMedian(pixelWidths);
   return compared;
@@ -137,8 +138,8 @@ void writeTransientMasks(const Capture& capture, const std::vector<ImageU8>& tra
          photos.size());
 }
 
-void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh) {
-  ComparedPhotos compared = comparePhotos(capture, coarse);
+void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh, const OnPhoto& onPhoto) {
+  ComparedPhotos compared = comparePhotos(capture, coarse, onPhoto);
   const TransientSettings settings = chooseTransientSettings(compared);
   writeTransientMasks(capture, findTransientPixels(std::move(compared.photos), settings), mesh);
 }

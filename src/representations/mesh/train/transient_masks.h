@@ -4,6 +4,7 @@
 
 #include "representations/field/train/field_model.h"
 #include "representations/mesh/train/listed_folder.h"
+#include "representations/mesh/train/stage_progress.h"
 #include "representations/mesh/train/transient_pixels.h"
 #include "scene/capture.h"
 
@@ -16,7 +17,7 @@ struct ComparedPhotos {
 };
 // Compares every second pixel along both axes, or fewer of large photos. Pixels that a mask excludes have no point.
 // Throws Error if a photo or its mask cannot be read.
-ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse);
+ComparedPhotos comparePhotos(const Capture& capture, FieldModel& coarse, const OnPhoto& onPhoto = kNobodyWatches);
 // Returns the settings that suit these photos.
 TransientSettings chooseTransientSettings(const ComparedPhotos& compared);
 
@@ -26,7 +27,8 @@ TransientSettings chooseTransientSettings(const ComparedPhotos& compared);
 // cannot be read, or a file cannot be written.
 void writeTransientMasks(const Capture& capture, const std::vector<ImageU8>& transients, const fs::path& mesh);
 // Finds what is transient, and writes the masks. Throws Error as comparePhotos and writeTransientMasks do.
-void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh);
+void makeTransientMasks(const Capture& capture, FieldModel& coarse, const fs::path& mesh,
+                        const OnPhoto& onPhoto = kNobodyWatches);
 // The folder of these masks.
 ListedFolder transientFolder(const fs::path& mesh);
 

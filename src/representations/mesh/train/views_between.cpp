@@ -74,7 +74,7 @@ ListedFolder viewsFolder(const fs::path& mesh) {
   return ListedFolder(mesh / "views", "views");
 }
 
-double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
+double countPhotosOfPlace(const Capture& capture, FieldModel& coarse, const OnPhoto& onPhoto) {
   constexpr float kSurface = 0.5f;  // opacity
   constexpr double kTilesAcrossPlace = 2;
   FieldRenderer renderer(coarse);
@@ -85,7 +85,9 @@ double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
   std::vector<Sight> sights;
   std::vector<double> widths;  // of tiles
   const int edge = tileEdge(capture);
-  for (const int number : capture.photosIn(Split::train)) {
+  const std::vector<int> photos = capture.photosIn(Split::train);
+  int64_t done = 0;
+  for (const int number : photos) {
     const Photo& photo = capture.photos[number];
     const Camera& camera = capture.cameras[photo.camera];
     const CoarseView view(renderer, strideCamera(camera, edge), photo.worldFromCamera);
@@ -97,6 +99,7 @@ double countPhotosOfPlace(const Capture& capture, FieldModel& coarse) {
         widths.push_back(std::abs(surface->depth) / view.camera().focalX() * coarse.frame().scale);
       }
     }
+    onPhoto(++done, static_cast<int64_t>(photos.size()));
   }
   if (sights.empty()) return 0;
   const double place = kTilesAcrossPlace * upperMedian(widths);
@@ -143,8 +146,9 @@ Capture placeViewsBetween(Capture capture, size_t count, uint64_t seed) {
   return capture;
 }
 
-void makeViewsBetween(const Capture& capture, FieldModel& coarse, const fs::path& mesh, int enough, uint64_t seed) {
-  const double photosOfPlace = countPhotosOfPlace(capture, coarse);
+void makeViewsBetween(const Capture& capture, FieldModel& coarse, const fs::path& mesh, int enough, uint64_t seed,
+                      const OnPhoto& onPhoto) {
+  const double photosOfPlace = countPhotosOfPlace(capture, coarse, onPhoto);
   const size_t photos = capture.photosIn(Split::train).size();
   const size_t count = countMissingViews(photos, photosOfPlace, enough);
   const Capture placed = placeViewsBetween(capture, count, seed);
@@ -154,6 +158,7 @@ void makeViewsBetween(const Capture& capture, FieldModel& coarse, const fs::path
     const Photo& photo = placed.photos[capture.photos.size() + view];
     const RenderedView image = renderer.render(placed.cameras[photo.camera], photo.worldFromCamera, nullptr);
     folder.writeFile(viewFile(view), encodePng(toBytes(image.colour)));
+    onPhoto(static_cast<int64_t>(photos + view + 1), static_cast<int64_t>(photos + count));
   }
   folder.writeList(count);
   inform("{:.0f} photos show the same place in the median; {}", photosOfPlace,

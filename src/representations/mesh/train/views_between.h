@@ -5,13 +5,14 @@
 
 #include "representations/field/train/field_model.h"
 #include "representations/mesh/train/listed_folder.h"
+#include "representations/mesh/train/stage_progress.h"
 #include "scene/capture.h"
 
 namespace tessera {
 
 // Returns the number of training photos that show the place of a pixel, the median over all pixels, from what the
 // middles of their tiles show of the coarse field; 0 if they show no surface.
-double countPhotosOfPlace(const Capture& capture, FieldModel& coarse);
+double countPhotosOfPlace(const Capture& capture, FieldModel& coarse, const OnPhoto& onPhoto = kNobodyWatches);
 
 // Returns the number of views that are missing for `enough` photos of each place, if each view counts as a photo; at
 // most kMaxViewsPerPhoto for each of `photos`.
@@ -24,8 +25,10 @@ size_t countMissingViews(size_t photos, double photosOfPlace, int enough);
 Capture placeViewsBetween(Capture capture, size_t count, uint64_t seed);
 
 // Renders the views of placeViewsBetween into the folder `views` of the model of a mesh, as many as are missing for
-// `enough` photos. Other processes may write the same views at the same time. Throws Error if a file cannot be written.
-void makeViewsBetween(const Capture& capture, FieldModel& coarse, const fs::path& mesh, int enough, uint64_t seed);
+// `enough` photos. `onPhoto` counts the photos and these views. Other processes may write the same views at the same
+// time. Throws Error if a file cannot be written.
+void makeViewsBetween(const Capture& capture, FieldModel& coarse, const fs::path& mesh, int enough, uint64_t seed,
+                      const OnPhoto& onPhoto = kNobodyWatches);
 // The folder of these views; there may be none.
 ListedFolder viewsFolder(const fs::path& mesh);
 

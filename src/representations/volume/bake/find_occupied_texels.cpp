@@ -168,7 +168,7 @@ class OutOfCorePhotoVisitor {
       photos.look(beside, SeenThrough::margin, true);
       visits_ += static_cast<int64_t>(within.size());
       const int64_t all = static_cast<int64_t>(photos_.size());
-      options_.onPhoto(all * visits_ / plannedVisits_, all);
+      options_.onStep(all * visits_ / plannedVisits_, all);
     }
   }
 
@@ -191,7 +191,7 @@ std::vector<OccupiedTexels> findOccupiedTexels(VolumeModel& model, const Capture
   PhotoVisitor photos(capture, model.frame(), kRays, finder);
   if (model.holdsAll()) {
     const bool backgroundBlock = model.space().blocks() > model.space().cells();
-    photos.visitAll(options.stride, {backgroundBlock, false}, options.onPhoto);
+    photos.visitAll(options.stride, {backgroundBlock, false}, options.onStep);
     return occupied;
   }
   OutOfCorePhotoVisitor visitor(model, capture, options);

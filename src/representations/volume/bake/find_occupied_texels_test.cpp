@@ -193,7 +193,7 @@ TEST(FindOccupiedTexels, GivesTheSameWithFewBlocksWhereAllThatAPixelSeesAreResid
     const std::unique_ptr<VolumeModel> few = loadVolumeModel(*device, scene / "model", 2);
     int64_t done = 0;
     BakeOptions options = everyPixels(stride);
-    options.onPhoto = [&](int64_t now, int64_t photos) {
+    options.onStep = [&](int64_t now, int64_t photos) {
       EXPECT_GE(now, done);
       EXPECT_EQ(photos, 5);
       EXPECT_EQ(few->slots(), 2u);
@@ -246,7 +246,7 @@ TEST(BakeVolume, NeverHasMoreBlocksInMemoryThanItMay) {
     VolumeModel* model = nullptr;
     std::set<uint32_t> residentBlocks;
     BakeOptions options = everyPixels(2);
-    options.onPhoto = [&](int64_t, int64_t) {
+    options.onStep = [&](int64_t, int64_t) {
       EXPECT_EQ(model->attributes().slots(), (resident == 0 ? 4 : resident) + 1);
       EXPECT_EQ(model->proposals().slots(), model->attributes().slots());
       residentBlocks.insert(model->blockOfSlot().begin(), model->blockOfSlot().end());
