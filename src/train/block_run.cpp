@@ -22,6 +22,9 @@ constexpr double kHeap = 1.02;       // overhead of the C library's heap (1.002 
 
 }  // namespace
 
+bool BlockRunOptions::requests(const std::string& name) const {
+  return only.empty() || std::find(only.begin(), only.end(), name) != only.end();
+}
 double BlockRunOptions::plannedBytes() const {
   return memoryMiB > 0 ? memoryMiB * kMiB : static_cast<double>(usableMemoryBytes());
 }

@@ -22,7 +22,8 @@ struct BlockRunOptions {
   uint64_t gpuBytes = 0;          // Device::ownMemory of the training device, which stores the blocks; 0: none
   std::vector<std::string> only;  // of a method that trains its parts by themselves: the names of these; empty: all
 
-  double plannedBytes() const;    // memoryMiB, or the machine's usable memory
+  bool requests(const std::string& name) const;  // whether the part of this name is to be trained
+  double plannedBytes() const;                   // memoryMiB, or the machine's usable memory
   double bytesForBlocks() const;  // share of plannedBytes or of the GPU's memory; the rest is working memory of steps
   double bytesForPhotos() const;  // share of plannedBytes
 };

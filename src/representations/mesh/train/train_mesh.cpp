@@ -4,7 +4,6 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <bit>
 #include <chrono>
 #include <cmath>
 #include <iterator>
@@ -14,10 +13,9 @@
 
 #include "base/error.h"
 #include "base/log.h"
-#include "representations/field/train/train_field.h"
+#include "representations/mesh/train/coarse_stage.h"
+#include "representations/mesh/train/stage_progress.h"
 #include "representations/mesh/train/trained_mesh.h"
-#include "representations/mesh/train/transient_masks.h"
-#include "representations/mesh/train/views_between.h"
 #include "train/colour_loss.h"
 #include "train/run_folder.h"
 
@@ -45,29 +43,6 @@ class Stopwatch {
  private:
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
-
-// The coarse field needs no details: only where surfaces are, and the exposures of the photos. It grows with the number
-// of blocks, so that it can tell their surfaces apart.
-FieldConfig coarseConfig(const MeshConfig& config, const BlockGrid& grid) {
-  constexpr uint32_t kLeastFinest = 256, kMaxFinest = 2048;
-  constexpr uint32_t kLeastLog2Size = 15, kMaxLog2Size = 19, kBlocksOfLeast = 4;
-  constexpr int kMaxLongestOfLeast = 4;  // blocks along an edge of the region
-  const uint32_t longest = static_cast<uint32_t>(std::max(grid.columns, grid.rows));
-  const uint32_t blocks = static_cast<uint32_t>(grid.cells());
-  FieldConfig coarse;
-  coarse.seed = config.seed;
-  coarse.photoBudgetMiB = config.photoBudgetMiB;
-  coarse.samplesPerStep = 1 << 15;
-  coarse.gridLog2Size = static_cast<int>(
-      std::min(kMaxLog2Size, kLeastLog2Size + static_cast<uint32_t>(std::bit_width((blocks - 1) / kBlocksOfLeast))));
-  coarse.gridLevels = 8;
-  coarse.gridFinest = static_cast<int>(
-      std::clamp(std::bit_ceil(static_cast<uint32_t>(config.meshCells) * longest), kLeastFinest, kMaxFinest));
-  if (longest > kMaxLongestOfLeast) coarse.occupancyResolution *= 2;
-  coarse.exposure = config.exposure;
-  coarse.exposureLearningRate = config.exposureLearningRate;
-  return coarse;
-}
 
 PartitionRequirements partitionRequirements(const MeshConfig& config) {
   return {[&] {
@@ -112,54 +87,6 @@ void requireParts(const std::vector<std::string>& only, const std::vector<MeshPa
     const bool exists = name == kCoarse || std::any_of(parts.begin(), parts.end(),
                                                        [&](const MeshPart& part) { return part.name == name; });
     if (!exists) throw Error("--only-blocks " + name, "", "there is no such block", "use some of " + names);
-  }
-}
-
-// Trains the coarse field. Returns false if it was asked to stop.
-bool trainCoarseField(Device& device, const Capture& capture, const fs::path& model, const BlockGrid& grid,
-                      const TrainMeshOptions& options) {
-  const ModelFolder folder = coarseFolder(model);
-  FieldConfig coarse = coarseConfig(options.config, grid);
-  TrainingLoopOptions loop = options.loop;
-  const bool goesOn = folder.manifest().has_value();
-  loop.resume = options.loop.resume || goesOn;  // also from a plan before the first checkpoint
-  if (loop.minutes > 0) {
-    loop.minutes *= options.config.coarseShare;
-  } else {
-    loop.steps = options.config.coarseSteps;
-  }
-  if (goesOn) {
-    // A finished field stays as it is: parts were trained from it, and other processes may be reading it.
-    const ModelManifest manifest = requireManifest(folder, "field");
-    if (manifest.plannedSteps > 0 && manifest.step >= manifest.plannedSteps) return true;
-    coarse.photoBudgetMiB = savedConfig<FieldConfig>(folder.root()).photoBudgetMiB;
-    requireSameConfig(folder.root(), coarse);
-  }
-  return trainField(device, capture, folder.root(), {coarse, loop}).finished;
-}
-
-uint64_t viewSeed(const MeshConfig& config) {
-  return static_cast<uint64_t>(config.seed);
-}
-
-// Makes what the parts are trained with beside the photos, unless it has been made. Throws StageStopped.
-void compareWithCoarseField(Device& device, const Capture& capture, const fs::path& model,
-                            const TrainMeshOptions& options) {
-  const MeshConfig& config = options.config;
-  const bool needsMasks = config.leavesTransientsOut() && !transientFolder(model).isComplete();
-  // Without a background block, photos may be transparent, and views by the coarse field are not.
-  const bool needsViews = config.enoughPhotos > 0 && config.hasBackground() && !viewsFolder(model).isComplete();
-  if (!needsMasks && !needsViews) return;
-  const auto coarse = loadFieldModel(device, coarseFolder(model).root());
-  if (needsMasks) {
-    StageProgress progress("looking for what moves", options.loop);
-    makeTransientMasks(capture, *coarse, model, progress.onPhoto());
-    progress.finish();
-  }
-  if (needsViews) {
-    StageProgress progress("looking for places in few photos", options.loop);
-    makeViewsBetween(capture, *coarse, model, config.enoughPhotos, viewSeed(config), progress.onPhoto());
-    progress.finish();
   }
 }
 
@@ -238,9 +165,153 @@ std::optional<TrainingResult> findFinished(const fs::path& model, const std::vec
   return sum;
 }
 
+// Prepares the folder of a run that begins: removes models of a former run, and nothing else that may be in the folder.
+void beginRun(const Device& device, const Capture& given, const BlockRun& run, const std::vector<MeshPart>& parts,
+              TrainMeshOptions& options) {
+  const fs::path& model = run.folder.root();
+  for (const MeshPart& part : parts) removeModel(partFolder(model, part));
+  if (!options.loop.resume) {
+    removeCoarseStage(model);
+    fs::remove(model / "run.json");
+  }
+  fs::remove(model / "shown.json");
+  keepLength(model, options.loop);
+  writeConfig(device, model, options.config, options.loop);
+  run.folder.writePlacement({{}, run.grid, given.sourceFromWorld, given.root, trainingNames(given)}, "mesh");
+  writeMeshManifest(model, parts);  // from now on, --resume takes settings and blocks from this folder
+}
+
+// Trains the parts that were asked for, one after another.
+class PartsTraining {
+ public:
+  // `given`: the capture; `capture`: what the parts are trained on (captureOfParts). Holds references to all of them.
+  PartsTraining(Device& device, const Capture& given, const Capture& capture, const BlockRun& run,
+                const TrainMeshOptions& options, const Stopwatch& stopwatch)
+      : device_(device),
+        given_(given),
+        capture_(capture),
+        run_(run),
+        model_(run.folder.root()),
+        options_(options),
+        config_(options.config),
+        stopwatch_(stopwatch) {}
+
+  // Throws StageStopped.
+  TrainingResult train(const std::vector<MeshPart>& parts) {
+    plan(parts);
+    std::vector<MeshPart> shown;
+    double shareLeft = 0;
+    for (const PlannedPart& plan : planned_) {
+      shareLeft += plan.share;
+      shown.push_back(plan.part);
+    }
+    writeShownParts(model_, shown);
+    const auto saved = [&] { writeMeshManifest(model_, shown); };
+    sum_.finished = true;
+    for (PlannedPart& plan : planned_) {
+      if (!options_.requests(plan.part.name)) continue;
+      TrainingLoopOptions loop = planLoop(plan, shareLeft);
+      loop.saved = saved;
+      shareLeft -= plan.share;
+      if (!trainPart(plan, loop)) break;
+    }
+    sum_.samplesPerSecond = samples_ / std::max(1e-9, sum_.seconds);
+    sum_.samplesPerRay = samples_ / std::max(1.0, rays_);
+    sum_.seconds = 60 * stopwatch_.minutes();  // with all that comes before the steps of parts
+    return sum_;
+  }
+
+ private:
+  // Vertices start at the surface only in blocks whose training begins now.
+  bool startsAtSurface(const MeshPart& part) const {
+    return config_.surfaceStart && !part.isBackground() && options_.requests(part.name) &&
+           !partFolder(model_, part).manifest();
+  }
+
+  void plan(const std::vector<MeshPart>& parts) {
+    const auto coarse = loadFieldModel(device_, coarseFolder(model_).root());
+    const bool seesPoints =
+        std::any_of(parts.begin(), parts.end(), [&](const MeshPart& part) { return startsAtSurface(part); });
+    StageProgress progress("looking for surfaces", options_.loop);
+    survey_.emplace(capture_, *coarse, seesPoints, progress.onPhoto());
+    progress.finish();
+    planned_ = planParts(capture_, parts, *survey_, config_);
+    survey_->forgetTiles();
+    coarseFile_ = coarseFolder(model_).root() / requireManifest(coarseFolder(model_)).files.at(0);
+    coarseState_ = readSafetensors(coarseFile_);
+  }
+
+  TrainingLoopOptions planLoop(const PlannedPart& plan, double shareLeft) const {
+    TrainingLoopOptions loop = options_.loop;
+    loop.resume = run_.goesOn || partFolder(model_, plan.part).manifest().has_value();  // also from a plan
+    if (loop.minutes > 0) {
+      const double left = run_.goesOn || !options_.only.empty()
+                              ? (1 - config_.coarseShare) * shareLeft * options_.loop.minutes
+                              : options_.loop.minutes - stopwatch_.minutes();
+      loop.minutes = std::max(kLeastMinutes, left * plan.share / shareLeft);
+      if (!plan.part.isBackground()) loop.minutes = minutesOfSteps(config_, loop.minutes);
+    } else if (plan.part.isBackground()) {
+      loop.steps = stepsOfPart(config_, plan.part, loop.steps);
+    }
+    return loop;
+  }
+
+  // Returns whether it was trained to its end.
+  bool trainPart(PlannedPart& plan, const TrainingLoopOptions& loop) {
+    const double pixels = plan.start.pixels(), through = plan.start.through.total();
+    if (startsAtSurface(plan.part))
+      plan.start.displacements = survey_->findDisplacements(plan.part, config_.domain(plan.part, 0));
+    MeshTrainer trainer(device_, capture_, config_, plan.part, std::move(plan.start));
+    if (config_.exposure) trainer.useExposures(coarseFile_, coarseState_, given_.photos.size());
+    inform("{}: {:.0f} pixels of the photos show it{}", plan.part.name, pixels,
+           through > 0 ? fmt::format(", {:.0f} only what is behind it", through) : "");
+    const ModelFolder folder = partFolder(model_, plan.part);
+    fs::create_directories(folder.root());
+    const TrainingResult result = runTraining(trainer, folder, loop);
+    addToSum(plan.part, pixels, result);
+    return result.finished;
+  }
+
+  void addToSum(const MeshPart& part, double pixels, const TrainingResult& result) {
+    sum_.step += result.step;
+    sum_.plannedSteps += result.plannedSteps;
+    sum_.seconds += result.seconds;
+    sum_.finished = sum_.finished && result.finished;
+    const double samples = result.seconds * result.samplesPerSecond;
+    if (samples <= 0) return;  // the part was finished before
+    samples_ += samples;
+    rays_ += samples / std::max(1e-9, result.samplesPerRay);
+    inform("{}: {:.1f} hits a ray, {:.2f} M a second", part.name, result.samplesPerRay, result.samplesPerSecond / 1e6);
+    if (part.isBackground()) return;
+    trainedPixels_ += pixels;
+    sum_.psnr += (result.psnr - sum_.psnr) * pixels / trainedPixels_;  // the mean by pixels
+  }
+
+  Device& device_;
+  const Capture &given_, &capture_;
+  const BlockRun& run_;
+  const fs::path& model_;
+  const TrainMeshOptions& options_;
+  const MeshConfig& config_;
+  const Stopwatch& stopwatch_;
+  std::optional<SurfaceSurvey> survey_;
+  std::vector<PlannedPart> planned_;
+  fs::path coarseFile_;
+  Safetensors coarseState_;
+  TrainingResult sum_;
+  double samples_ = 0, rays_ = 0, trainedPixels_ = 0;
+};
+
+TrainingResult toResult(const ModelManifest& manifest, bool finished) {
+  TrainingResult result;
+  result.step = manifest.step;
+  result.plannedSteps = manifest.plannedSteps;
+  result.finished = finished;
+  return result;
+}
+
 // Throws StageStopped.
-TrainingResult trainCoarseFieldAndParts(Device& device, const Capture& given, const fs::path& model,
-                                        TrainMeshOptions options) {
+TrainingResult trainAllStages(Device& device, const Capture& given, const fs::path& model, TrainMeshOptions options) {
   const Stopwatch stopwatch;
   MeshConfig& config = options.config;
   config.check();
@@ -250,28 +321,13 @@ TrainingResult trainCoarseFieldAndParts(Device& device, const Capture& given, co
   config.photoBudgetMiB = run.photoBudgetMiB;
   const std::vector<MeshPart> parts = makeMeshParts(run.grid, config.hasBackground());
   requireParts(options.only, parts);
-  if (!run.goesOn) {
-    // Models of a former run, and nothing else that may be in the folder.
-    const auto removeModel = [](const ModelFolder& folder) {
-      if (fs::exists(folder.root() / "manifest.json")) fs::remove_all(folder.root());
-    };
-    for (const MeshPart& part : parts) removeModel(partFolder(model, part));
-    if (!options.loop.resume) removeModel(coarseFolder(model));
-    if (!options.loop.resume) transientFolder(model).remove();
-    if (!options.loop.resume) viewsFolder(model).remove();
-    if (!options.loop.resume) fs::remove(model / "run.json");
-    fs::remove(model / "shown.json");
+  if (run.goesOn) {
     keepLength(model, options.loop);
-    writeConfig(device, model, config, options.loop);
-    run.folder.writePlacement({{}, run.grid, given.sourceFromWorld, given.root, trainingNames(given)}, "mesh");
-    writeMeshManifest(model, parts);  // from now on, --resume takes settings and blocks from this folder
   } else {
-    keepLength(model, options.loop);
+    beginRun(device, given, run, parts, options);
   }
-  if (!trainCoarseField(device, given, model, run.grid, options)) throw StageStopped();
-  compareWithCoarseField(device, given, model, options);
-  const Capture capture = addViewsBetween(config.leavesTransientsOut() ? applyTransientMasks(given, model) : given,
-                                          model, viewSeed(config));
+  trainCoarseStage(device, given, model, run.grid, config, options.loop);
+  const Capture capture = captureOfParts(given, model, config);
   // The budget counts the views between the photos, too, and decides on the order in which photos are drawn.
   const double photoBudgetMiB = resolvePhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
   if (photoBudgetMiB != config.photoBudgetMiB) {
@@ -279,109 +335,23 @@ TrainingResult trainCoarseFieldAndParts(Device& device, const Capture& given, co
     writeConfig(device, model, config, options.loop);
   }
   writeMeshManifest(model, parts);
-  const auto isRequested = [&](const std::string& name) {
-    return options.only.empty() || std::find(options.only.begin(), options.only.end(), name) != options.only.end();
-  };
   std::vector<MeshPart> requested;
   std::copy_if(parts.begin(), parts.end(), std::back_inserter(requested),
-               [&](const MeshPart& part) { return isRequested(part.name); });
-  TrainingResult sum;
-  sum.finished = true;
-  if (requested.empty()) {  // only the coarse field
-    const ModelManifest coarse = requireManifest(coarseFolder(model));
-    sum.step = coarse.step;
-    sum.plannedSteps = coarse.plannedSteps;
-    return sum;
-  }
+               [&](const MeshPart& part) { return options.requests(part.name); });
+  if (requested.empty()) return toResult(requireManifest(coarseFolder(model)), true);  // only the coarse field
   if (run.goesOn)
     if (const auto finished = findFinished(model, requested, options)) return *finished;
-
-  // Vertices start at the surface only in blocks whose training begins now.
-  const auto startsAtSurface = [&](const MeshPart& part) {
-    return config.surfaceStart && !part.isBackground() && isRequested(part.name) && !partFolder(model, part).manifest();
-  };
-  std::optional<SurfaceSurvey> survey;
-  std::vector<PlannedPart> planned;
-  fs::path coarseFile;
-  {
-    const auto coarse = loadFieldModel(device, coarseFolder(model).root());
-    StageProgress progress("looking for surfaces", options.loop);
-    survey.emplace(capture, *coarse, std::any_of(parts.begin(), parts.end(), startsAtSurface), progress.onPhoto());
-    progress.finish();
-    planned = planParts(capture, parts, *survey, config);
-    survey->forgetTiles();
-    coarseFile = coarseFolder(model).root() / requireManifest(coarseFolder(model)).files.at(0);
-  }
-  const Safetensors coarseState = readSafetensors(coarseFile);
-  double shareLeft = 0, samples = 0, rays = 0, trainedPixels = 0;
-  std::vector<MeshPart> shown;
-  for (const PlannedPart& plan : planned) {
-    shareLeft += plan.share;
-    shown.push_back(plan.part);
-  }
-  writeShownParts(model, shown);
-  options.loop.saved = [&] { writeMeshManifest(model, shown); };
-  for (PlannedPart& plan : planned) {
-    const ModelFolder folder = partFolder(model, plan.part);
-    if (!isRequested(plan.part.name)) continue;
-    TrainingLoopOptions loop = options.loop;
-    loop.resume = run.goesOn || folder.manifest().has_value();  // also from a plan before the first checkpoint
-    if (loop.minutes > 0) {
-      const double left = run.goesOn || !options.only.empty()
-                              ? (1 - config.coarseShare) * shareLeft * options.loop.minutes
-                              : options.loop.minutes - stopwatch.minutes();
-      loop.minutes = std::max(kLeastMinutes, left * plan.share / shareLeft);
-      if (!plan.part.isBackground()) loop.minutes = minutesOfSteps(config, loop.minutes);
-    } else if (plan.part.isBackground()) {
-      loop.steps = stepsOfPart(config, plan.part, loop.steps);
-    }
-    shareLeft -= plan.share;
-    const double pixels = plan.start.pixels(), through = plan.start.through.total();
-    if (startsAtSurface(plan.part))
-      plan.start.displacements = survey->findDisplacements(plan.part, config.domain(plan.part, 0));
-    MeshTrainer trainer(device, capture, config, plan.part, std::move(plan.start));
-    if (config.exposure) trainer.useExposures(coarseFile, coarseState, given.photos.size());
-    inform("{}: {:.0f} pixels of the photos show it{}", plan.part.name, pixels,
-           through > 0 ? fmt::format(", {:.0f} only what is behind it", through) : "");
-    fs::create_directories(folder.root());
-    const TrainingResult result = runTraining(trainer, folder, loop);
-    sum.step += result.step;
-    sum.plannedSteps += result.plannedSteps;
-    sum.seconds += result.seconds;
-    const double samplesOfPart = result.seconds * result.samplesPerSecond;
-    samples += samplesOfPart;
-    rays += samplesOfPart / std::max(1e-9, result.samplesPerRay);
-    if (samplesOfPart > 0) {  // else the part was finished before
-      inform("{}: {:.1f} hits a ray, {:.2f} M a second", plan.part.name, result.samplesPerRay,
-             result.samplesPerSecond / 1e6);
-    }
-    if (!plan.part.isBackground() && samplesOfPart > 0) {
-      trainedPixels += pixels;
-      sum.psnr += (result.psnr - sum.psnr) * pixels / trainedPixels;  // the mean by pixels
-    }
-    if (!result.finished) {
-      sum.finished = false;
-      break;
-    }
-  }
-  sum.samplesPerSecond = samples / std::max(1e-9, sum.seconds);
-  sum.samplesPerRay = samples / std::max(1.0, rays);
-  sum.seconds = 60 * stopwatch.minutes();  // with all that comes before the steps of parts
-  return sum;
+  return PartsTraining(device, given, capture, run, options, stopwatch).train(parts);
 }
 
 }  // namespace
 
 TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path& model, TrainMeshOptions options) {
   try {
-    return trainCoarseFieldAndParts(device, capture, model, std::move(options));
+    return trainAllStages(device, capture, model, std::move(options));
   } catch (const StageStopped&) {
-    TrainingResult reached;
-    if (const std::optional<ModelManifest> manifest = ModelFolder(model).manifest()) {
-      reached.step = manifest->step;
-      reached.plannedSteps = manifest->plannedSteps;
-    }
-    return reached;
+    const std::optional<ModelManifest> manifest = ModelFolder(model).manifest();
+    return manifest ? toResult(*manifest, false) : TrainingResult();
   }
 }
 
