@@ -469,7 +469,7 @@ interrupted() {
 killed() {
   tiny_city
   local started=$SECONDS kills=0 lasted steps after last
-  rm -rf "$work/tiny-killed" "$work"/tiny-*.scene
+  rm -rf "$work"/tiny-{killed,timed} "$work"/tiny-*.scene
   tiny tiny-timed
   lasted=$((SECONDS - started))
   rm -rf "$work/tiny-timed"
