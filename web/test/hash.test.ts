@@ -17,17 +17,22 @@ import { viewAt } from './views';
 declare const headlessPage: HeadlessPage;
 declare const gpuMemory: GpuMemory;
 
-// Changes the JSON of every content to text of the same length.
+// Changes the JSON of every content to text of the same length, and the names of the files, which state a digest.
 function changeContents(folder: string, from: string, to: string): void {
   expect(to.length).toBe(from.length);
+  const tilesetFile = join(folder, 'tileset.json');
+  let tileset = readFileSync(tilesetFile, 'utf8');
   for (const entry of readdirSync(folder, { recursive: true, encoding: 'utf8' })) {
     if (!entry.endsWith('.glb')) continue;
     const file = readFileSync(join(folder, entry));
     const at = file.indexOf(from);
     expect(at).toBeGreaterThan(0);
     file.write(to, at);
-    writeFileSync(join(folder, entry), file);
+    const changed = entry.replace(/-[0-9a-f]{16}\.glb$/, '_changed.glb');
+    writeFileSync(join(folder, changed), file);
+    tileset = tileset.replaceAll(entry, changed);
   }
+  writeFileSync(tilesetFile, tileset);
 }
 
 describe.skipIf(missing())('a scene of hash', () => {
