@@ -12,6 +12,15 @@ if(TESSERA_TESTS)
     <string_view> <thread> <vector> <Eigen/Core> <Eigen/Geometry> <fmt/format.h>)
 endif()
 
+# Seconds that one CTest entry may take, and one process of an entry that shares its tests. Sanitizers make tests 5 to 15 times
+# slower; a limit that only a quiet machine keeps would report a slow test as a failed one.
+set(tessera_test_timeout 300)
+set(tessera_test_process_timeout 1200)
+if(TESSERA_SANITIZER)
+  set(tessera_test_timeout 1800)
+  set(tessera_test_process_timeout 3600)
+endif()
+
 # tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p] [PROCESSES n]): adds the binary tessera_NAME_test with
 # one CTest entry p/... for each test; p defaults to NAME. With PROCESSES there are n entries that share its tests instead: for many
 # tests that need the same fixture (a device and its pipelines, a capture), which each process then prepares once. CTest does not
@@ -31,11 +40,12 @@ function(tessera_unit_tests name)
     math(EXPR last "${ARG_PROCESSES} - 1")
     foreach(index RANGE ${last})
       add_test(NAME ${ARG_PREFIX}/process_${index}_of_${ARG_PROCESSES} COMMAND ${target})
-      set_tests_properties(${ARG_PREFIX}/process_${index}_of_${ARG_PROCESSES} PROPERTIES TIMEOUT 1200
+      set_tests_properties(${ARG_PREFIX}/process_${index}_of_${ARG_PROCESSES} PROPERTIES
+        TIMEOUT ${tessera_test_process_timeout}
         ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_PROCESSES};GTEST_SHARD_INDEX=${index}")
     endforeach()
   else()
     gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}/" DISCOVERY_MODE PRE_TEST
-      PROPERTIES TIMEOUT 300 SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
+      PROPERTIES TIMEOUT ${tessera_test_timeout} SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
   endif()
 endfunction()
