@@ -51,6 +51,7 @@ endfunction()
 #   CONTENT_LIBRARIES x ...        third-party targets that no header of this part mentions; likewise for the other parts
 #   TESTS a_test.cpp ...           unit tests of all parts, in one binary tessera_representation_NAME_test to save link time
 #   VULKAN_TESTS b_test.cpp ...    those of them that need Vulkan
+#   TEST_SUITES s ...              suites of these tests with a fixture that takes long, one CTest entry each (tessera_unit_tests)
 #   TEST_USES render ...           other modules that tests use
 #   TEST_LIBRARIES x ...)          third-party targets that they use
 #
@@ -59,7 +60,7 @@ endfunction()
 # (content/reader.cpp). VULKAN is the target of the shaders: tessera_shader(tessera_NAME_vulkan ...).
 function(tessera_representation name)
   set(parts CONTENT CPU VULKAN TRAIN)
-  set(lists ${parts} TESTS VULKAN_TESTS TEST_USES TEST_LIBRARIES)
+  set(lists ${parts} TESTS VULKAN_TESTS TEST_SUITES TEST_USES TEST_LIBRARIES)
   foreach(part IN LISTS parts)
     list(APPEND lists ${part}_USES ${part}_LIBRARIES)
   endforeach()
@@ -92,7 +93,7 @@ function(tessera_representation name)
   if(TESSERA_TESTS AND (ARG_TESTS OR ARG_VULKAN_TESTS))
     list(TRANSFORM ARG_TEST_USES PREPEND tessera_)
     tessera_unit_tests(representation_${name} SOURCES ${ARG_TESTS} ${ARG_VULKAN_TESTS}
-      LIBRARIES ${libraries} ${ARG_TEST_USES} ${ARG_TEST_LIBRARIES})
+      LIBRARIES ${libraries} ${ARG_TEST_USES} ${ARG_TEST_LIBRARIES} SUITES ${ARG_TEST_SUITES})
     if(ARG_CPU)
       tessera_simd_targets(tessera_representation_${name}_test)
     endif()

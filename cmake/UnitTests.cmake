@@ -21,13 +21,14 @@ if(TESSERA_SANITIZER)
   set(tessera_test_process_timeout 3600)
 endif()
 
-# tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p] [PROCESSES n]): adds the binary tessera_NAME_test with
-# one CTest entry p/... for each test; p defaults to NAME. With PROCESSES there are n entries that share its tests instead: for many
-# tests that need the same fixture (a device and its pipelines, a capture), which each process then prepares once. CTest does not
-# report which of these tests are skipped. Tests are compiled with -O1, which takes a tenth less time than -O2; most of what they
+# tessera_unit_tests(NAME SOURCES a_test.cpp ... LIBRARIES x ... [PREFIX p] [PROCESSES n] [SUITES s ...]): adds the binary
+# tessera_NAME_test with one CTest entry p/... for each test; p defaults to NAME. With PROCESSES there are n entries that share its
+# tests instead: for many tests that need the same fixture (a device and its pipelines, a capture), which each process then prepares
+# once. SUITES are test suites with such a fixture of their own (a trained model): each is one entry p/SUITE. CTest does not report
+# which tests of shared entries are skipped. Tests are compiled with -O1, which takes a tenth less time than -O2; most of what they
 # run is in libraries, which are compiled as in the product.
 function(tessera_unit_tests name)
-  cmake_parse_arguments(ARG "" "PREFIX;PROCESSES" "SOURCES;LIBRARIES" ${ARGN})
+  cmake_parse_arguments(ARG "" "PREFIX;PROCESSES" "SOURCES;LIBRARIES;SUITES" ${ARGN})
   if(NOT ARG_PREFIX)
     set(ARG_PREFIX ${name})
   endif()
@@ -44,8 +45,20 @@ function(tessera_unit_tests name)
         TIMEOUT ${tessera_test_process_timeout}
         ENVIRONMENT "GTEST_TOTAL_SHARDS=${ARG_PROCESSES};GTEST_SHARD_INDEX=${index}")
     endforeach()
-  else()
-    gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}/" DISCOVERY_MODE PRE_TEST
-      PROPERTIES TIMEOUT ${tessera_test_timeout} SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
+    return()
   endif()
+  set(others)  # GoogleTest's filter of all tests that are in no suite of SUITES
+  if(ARG_SUITES)
+    list(TRANSFORM ARG_SUITES APPEND ".*" OUTPUT_VARIABLE suites)
+    list(JOIN suites ":" suites)
+    set(others TEST_FILTER "-${suites}")
+  endif()
+  foreach(suite IN LISTS ARG_SUITES)
+    # A suite that no longer exists must not pass as an entry without tests.
+    add_test(NAME ${ARG_PREFIX}/${suite} COMMAND ${target} --gtest_filter=${suite}.*)
+    set_tests_properties(${ARG_PREFIX}/${suite} PROPERTIES
+      TIMEOUT ${tessera_test_process_timeout} FAIL_REGULAR_EXPRESSION "Running 0 tests")
+  endforeach()
+  gtest_discover_tests(${target} TEST_PREFIX "${ARG_PREFIX}/" DISCOVERY_MODE PRE_TEST ${others}
+    PROPERTIES TIMEOUT ${tessera_test_timeout} SKIP_REGULAR_EXPRESSION "\\[  SKIPPED \\]")
 endfunction()

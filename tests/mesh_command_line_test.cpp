@@ -140,6 +140,7 @@ TEST_F(MeshCommandLine, RejectsOptionsThatItDoesNotSupport) {
   refuses(run({"bake", at("few"), at("few")}), "holds a model");
   refuses(run({"bake", at("few"), at("city")}), "holds a capture");
   refuses(run({"eval", at("few"), at("city"), "--lod", "1"}), "--lod: applies to scenes");
+  refuses(run({"eval", at("absent"), at("city"), "--lod", "1"}), "this is not a trained model");
   refuses(run({"render", at("few"), at("pictures"), "--views", at("city"), "--memory-mib", "9"}), "--memory-mib");
 }
 

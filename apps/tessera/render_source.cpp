@@ -14,7 +14,7 @@ bool holdsScene(const fs::path& folder) {
 }  // namespace
 
 void requireSceneFor(const RenderSourceOptions& options, const fs::path& folder) {
-  if (holdsScene(folder) || (options.level == 0 && options.memoryMiB == 0)) return;
+  if (holdsScene(folder) || !fs::exists(folder) || (options.level == 0 && options.memoryMiB == 0)) return;
   throw Error(folder.string(), options.level != 0 ? "--lod" : "--memory-mib", "applies to scenes, and this is none",
               "leave it out, or bake the model");
 }

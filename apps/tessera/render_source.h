@@ -31,7 +31,8 @@ struct RenderSourceOptions {
   double maximumScreenSpaceError = 0;  // for scenes: see SelectionSettings; 0: the finest everywhere
 };
 
-// Throws Error if the folder holds a model and the options are not the standard ones: they apply to scenes.
+// Throws Error if the folder exists, but holds no scene, and the options are not the standard ones: they apply to
+// scenes.
 void requireSceneFor(const RenderSourceOptions& options, const fs::path& folder);
 
 // Throws Error if the folder holds neither a model nor a scene, if the scene has no such level, or if its coarsest

@@ -58,15 +58,50 @@ TEST(Extraction, KeepsTheFacesThatPhotosSee) {
   EXPECT_EQ(heldOutPsnr(scene, model), before);
 }
 
-// Follows the rays of all pixels of training photos, and calls use(face, opacity, accumulated opacity before the hit).
-void forEachHit(const CubeScene& scene, MeshModel& model, const std::function<void(uint32_t, double, double)>& use) {
-  constexpr uint32_t kRays = CubeScene::kWidth * CubeScene::kHeight, kMaxHits = 256, kCapacity = kRays * kMaxHits;
+// Traces rays by the model, and composites their hits in double precision.
+class HitReader {
+ public:
+  // (face, opacity, accumulated opacity before the hit)
+  using Use = std::function<void(uint32_t, double, double)>;
+
+  HitReader(MeshModel& model, uint32_t maxRays)
+      : model_(model),
+        hits_(model.device(), maxRays, maxRays * kMaxHits),
+        counters_(model.device().array<uint32_t>(MeshHits::kCounters)),
+        logits_(model.device().array<float>(size_t{maxRays} * kMaxHits)) {
+    hits_.counters = counters_;
+    model.field().reserve(maxRays * kMaxHits);
+  }
+
+  void read(const MeshRays& rays, const Use& use) {
+    Device& device = model_.device();
+    model_.level(0).trace(rays, kMaxHits, false, hits_);
+    model_.field().encode(hits_.samples(), hits_.positions, Matrix<float>(logits_, 1));
+    const std::vector<float> all = device.read(logits_.all());
+    const std::vector<uint32_t> first = device.read(hits_.firstSample.all()), faces = device.read(hits_.faces.all());
+    for (uint32_t ray = 0; ray < rays.count; ++ray) {
+      double transmittance = 1;
+      for (uint32_t i = first[ray]; i < first[ray + 1]; ++i) {
+        const double opacity = 1 / (1 + std::exp(-static_cast<double>(all[i] + model_.opacityOffset())));
+        use(faces[i], opacity, 1 - transmittance);
+        transmittance *= 1 - opacity;
+      }
+    }
+  }
+
+ private:
+  static constexpr uint32_t kMaxHits = 256;  // of a ray
+  MeshModel& model_;
+  MeshHits hits_;
+  Array<uint32_t> counters_;
+  Array<float> logits_;
+};
+
+// Follows the rays of all pixels of training photos.
+void forEachHit(const CubeScene& scene, MeshModel& model, const HitReader::Use& use) {
+  constexpr uint32_t kRays = CubeScene::kWidth * CubeScene::kHeight;
   Device& device = model.device();
-  MeshHits hits(device, kRays, kCapacity);
-  Array<uint32_t> counters = device.array<uint32_t>(MeshHits::kCounters);
-  hits.counters = counters;
-  Array<float> logits = device.array<float>(kCapacity);
-  model.field().reserve(kCapacity);
+  HitReader reader(model, kRays);
   for (const int index : scene.capture().photosIn(Split::train)) {
     const Photo& photo = scene.capture().photos[index];
     const Vec3f eye = model.frame().sceneFromWorld(photo.worldFromCamera.translation).cast<float>();
@@ -80,19 +115,52 @@ void forEachHit(const CubeScene& scene, MeshModel& model, const std::function<vo
         directions.insert(directions.end(), direction.begin(), direction.end());
       }
     const Array<float> from = device.uploadArray(origins), along = device.uploadArray(directions);
-    model.level(0).trace({kRays, from, along, {}}, kMaxHits, false, hits);
-    model.field().encode(hits.samples(), hits.positions, Matrix<float>(logits, 1));
-    const std::vector<float> all = device.read(logits.all());
-    const std::vector<uint32_t> first = device.read(hits.firstSample.all()), faces = device.read(hits.faces.all());
-    for (uint32_t ray = 0; ray < kRays; ++ray) {
-      double transmittance = 1;
-      for (uint32_t i = first[ray]; i < first[ray + 1]; ++i) {
-        const double opacity = 1 / (1 + std::exp(-static_cast<double>(all[i] + model.opacityOffset())));
-        use(faces[i], opacity, 1 - transmittance);
-        transmittance *= 1 - opacity;
+    reader.read({kRays, from, along, {}}, use);
+  }
+}
+
+// Parallel rays from above: straight down, and from 8 directions at each of three heights.
+void forEachHitOfParallelRays(MeshModel& model, double spacing, const HitReader::Use& use) {
+  Device& device = model.device();
+  std::vector<Vec3d> backwards{Vec3d::UnitZ()};
+  for (const double height : {std::sqrt(0.75), std::sqrt(0.5), 0.5})
+    for (int eighth = 0; eighth < 8; ++eighth)
+      backwards.push_back(Eigen::AngleAxisd(eighth * EIGEN_PI / 4, Vec3d::UnitZ()) *
+                          Vec3d(std::sqrt(1 - height * height), 0, height));
+  const int rays = static_cast<int>(2 * std::sqrt(3.0) / spacing) + 1;  // along each side of their square
+  HitReader reader(model, static_cast<uint32_t>(rays));
+  for (const Vec3d& direction : backwards) {
+    const bool vertical = direction.z() == 1;
+    const Vec3d right = vertical ? Vec3d(1, 0, 0) : Vec3d(Vec3d::UnitZ().cross(direction).normalized());
+    const Vec3d up = direction.cross(right);
+    for (int row = 0; row < rays; ++row) {
+      std::vector<float> origins, directions;
+      for (int column = 0; column < rays; ++column) {
+        const Vec3d origin = (column * spacing - std::sqrt(3.0)) * right + (row * spacing - std::sqrt(3.0)) * up +
+                             2 * std::sqrt(3.0) * direction;
+        for (int axis = 0; axis < 3; ++axis) {
+          origins.push_back(static_cast<float>(origin[axis]));
+          directions.push_back(static_cast<float>(-direction[axis]));
+        }
       }
+      const Array<float> from = device.uploadArray(origins), along = device.uploadArray(directions);
+      reader.read({static_cast<uint32_t>(rays), from, along, {}}, use);
     }
   }
+}
+
+// `faces` were kept because rays see them, those whose hits forEach passes to its argument.
+void expectWitnesses(MeshModel& model, const FaceSet& faces, const ExtractionSettings& settings,
+                     const std::function<void(const HitReader::Use&)>& forEach) {
+  constexpr double kRounding = 1e-3;
+  FaceSet clear(model.level(0).domain().grids), possible(model.level(0).domain().grids);
+  forEach([&](uint32_t face, double opacity, double before) {
+    if (opacity >= settings.minOpacity + kRounding && before <= settings.maxOpacity - kRounding) clear.add(face);
+    if (opacity >= settings.minOpacity - kRounding && before <= settings.maxOpacity + kRounding) possible.add(face);
+  });
+  EXPECT_GT(clear.count(), 100u);
+  for (const uint32_t face : clear.numbers()) EXPECT_TRUE(faces.contains(face)) << "a ray sees it";
+  for (const uint32_t face : faces.numbers()) EXPECT_TRUE(possible.contains(face)) << "no ray sees it";
 }
 
 TEST(Extraction, KeepsExactlyTheFacesWithAWitnessRay) {
@@ -103,16 +171,14 @@ TEST(Extraction, KeepsExactlyTheFacesWithAWitnessRay) {
   MeshModel& model = trained.trainer->model();
   ExtractionSettings photos;
   photos.raysPerCell = 0;
-  const FaceSet faces = extractFaces(model, 0, scene.capture(), nullptr, photos);
-  constexpr double kRounding = 1e-3;
-  FaceSet clear(model.level(0).domain().grids), possible(model.level(0).domain().grids);
-  forEachHit(scene, model, [&](uint32_t face, double opacity, double before) {
-    if (opacity >= photos.minOpacity + kRounding && before <= photos.maxOpacity - kRounding) clear.add(face);
-    if (opacity >= photos.minOpacity - kRounding && before <= photos.maxOpacity + kRounding) possible.add(face);
-  });
-  EXPECT_GT(clear.count(), 100u);
-  for (const uint32_t face : clear.numbers()) EXPECT_TRUE(faces.contains(face)) << "a ray sees it";
-  for (const uint32_t face : faces.numbers()) EXPECT_TRUE(possible.contains(face)) << "no ray sees it";
+  expectWitnesses(model, extractFaces(model, 0, scene.capture(), nullptr, photos), photos,
+                  [&](const HitReader::Use& use) { forEachHit(scene, model, use); });
+  const std::vector<TileShares> nothing(scene.capture().photos.size());
+  ExtractionSettings parallel;
+  parallel.raysPerCell = 1.5;
+  const double spacing = 2.0 / model.level(0).domain().grids[0].resolution / parallel.raysPerCell;
+  expectWitnesses(model, extractFaces(model, 0, scene.capture(), &nothing, parallel), parallel,
+                  [&](const HitReader::Use& use) { forEachHitOfParallelRays(model, spacing, use); });
 }
 
 TEST(Extraction, AddsOnlyQuadsBesideQuads) {
