@@ -119,7 +119,7 @@ void forEachHit(const CubeScene& scene, MeshModel& model, const HitReader::Use& 
   }
 }
 
-// Parallel rays from above: straight down, and from 8 directions at each of three heights.
+// Follows parallel rays from above: straight down, and from 8 directions each at 60°, 45° and 30° above the horizon.
 void forEachHitOfParallelRays(MeshModel& model, double spacing, const HitReader::Use& use) {
   Device& device = model.device();
   std::vector<Vec3d> backwards{Vec3d::UnitZ()};
