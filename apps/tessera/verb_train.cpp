@@ -151,6 +151,14 @@ std::string howToGoOn(const fs::path& model) {
   return "there is no model yet: repeat the same command, with --resume to keep what was determined so far";
 }
 
+// Returns the figures of the steps that have just been performed; nothing if there were none.
+std::string describeRates(const TrainingResult& result) {
+  if (result.samplesPerSecond <= 0) return {};
+  return fmt::format(" in {:.0f} s{}, {:.2f} M samples/s, {:.1f} a ray", result.seconds,
+                     result.psnr ? fmt::format(", {:.2f} dB on the training photos", *result.psnr) : "",
+                     result.samplesPerSecond / 1e6, result.samplesPerRay);
+}
+
 }  // namespace
 
 void addTrainVerb(CLI::App& app) {
@@ -213,15 +221,14 @@ void addTrainVerb(CLI::App& app) {
     const TrainingResult result = train(*device, *flags);
     if (flags->json) {
       fmt::print(
-          "{{\"step\": {}, \"planned_steps\": {}, \"finished\": {}, \"seconds\": {:.3f}, \"psnr\": {:.4f}, "
+          "{{\"step\": {}, \"planned_steps\": {}, \"finished\": {}, \"seconds\": {:.3f}, \"psnr\": {}, "
           "\"samples_per_second\": {:.0f}, \"samples_per_ray\": {:.2f}, \"device\": \"{}\"}}\n",
-          result.step, result.plannedSteps, result.finished, result.seconds, result.psnr, result.samplesPerSecond,
-          result.samplesPerRay, device->name());
+          result.step, result.plannedSteps, result.finished, result.seconds,
+          result.psnr ? fmt::format("{:.4f}", *result.psnr) : "null", result.samplesPerSecond, result.samplesPerRay,
+          device->name());
     } else {
-      fmt::print(
-          "{}: {} of {} steps in {:.0f} s, {:.2f} dB on the training photos, {:.2f} M samples/s, {:.1f} a ray, on {}\n",
-          flags->model, result.step, result.plannedSteps, result.seconds, result.psnr, result.samplesPerSecond / 1e6,
-          result.samplesPerRay, device->name());
+      fmt::print("{}: {} of {} steps{}, on {}\n", flags->model, result.step, result.plannedSteps, describeRates(result),
+                 device->name());
       if (!result.finished) fmt::print("stopped on request; {}\n", howToGoOn(flags->model));
     }
     // Signals to the shell that training has not finished, so that nothing bakes the model by mistake.

@@ -4,6 +4,7 @@
 #include <GLFW/glfw3.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <numbers>
 
 #include "apps/viewer/testing/test_screen.h"
@@ -80,6 +81,15 @@ TEST_F(ViewerTest, ShowsWhatAnotherDeviceDraws) {
   EXPECT_GT(psnr(toFloat(shown("volume", "cpu")), requested("volume")), 50);
   // Also if images arrive long after the window has come to rest.
   EXPECT_EQ(shown("volume", "cpu", false, 4).width, 4 * kWidth);
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+}
+
+// Vulkan draws no scenes of `mesh`: the window shows the images of the CPU on either device.
+TEST_F(ViewerTest, ShowsMeshScenesAsTheCpuDrawsThem) {
+  const ImageF oracle = requested("mesh");
+  const auto [least, most] = std::minmax_element(oracle.pixels.begin(), oracle.pixels.end());
+  EXPECT_GT(*most - *least, 0.3f) << "the view shows something";
+  for (const char* device : {"cpu", "vulkan"}) EXPECT_GT(psnr(toFloat(shown("mesh", device)), oracle), 50) << device;
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }
 

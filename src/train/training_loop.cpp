@@ -170,7 +170,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
       }
     }
     result.psnr = computePsnr(window.squaredError / window.steps);
-    if (progress) progress->update(state.step, fmt::format("{:.2f} dB", result.psnr));
+    if (progress) progress->update(state.step, fmt::format("{:.2f} dB", *result.psnr));
     if (now - window.since >= 2 || !unfinished()) {
       folder.appendMetrics(metricsLine(state.step, now, window));
       window = Window();
@@ -185,7 +185,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
   result.seconds = seconds();
   result.samplesPerSecond = totalSamples / std::max(1e-9, result.seconds);
   result.samplesPerRay = totalSamples / std::max(1.0, totalRays);
-  if (progress) progress->finish(fmt::format("{:.2f} dB", result.psnr));
+  if (progress) progress->finish(result.psnr ? fmt::format("{:.2f} dB", *result.psnr) : "");
   return result;
 }
 

@@ -57,7 +57,9 @@ struct TrainingLoopOptions {
 struct TrainingResult {
   int64_t step = 0, plannedSteps = 0;
   bool finished = false;
-  double seconds = 0, psnr = 0, samplesPerSecond = 0, samplesPerRay = 0;
+  // Of the steps that were performed now. `psnr`: of the training photos, at the end; none without steps.
+  double seconds = 0, samplesPerSecond = 0, samplesPerRay = 0;
+  std::optional<double> psnr;
 };
 
 // Throws Error if the folder holds a model and `resume` is off. Changes nothing.

@@ -90,7 +90,7 @@ TEST_F(TrainingLoop, DoesEveryStepOnceAndSaves) {
   EXPECT_TRUE(result.finished);
   EXPECT_EQ(result.step, 7);
   EXPECT_EQ(result.plannedSteps, 7);
-  EXPECT_NEAR(result.psnr, 20, 1e-9);
+  EXPECT_NEAR(result.psnr.value(), 20, 1e-9);
   EXPECT_EQ(result.samplesPerRay, 10);
   const auto manifest = folder_.manifest();
   ASSERT_TRUE(manifest);

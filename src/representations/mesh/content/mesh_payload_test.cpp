@@ -461,6 +461,18 @@ TEST_F(MeshDecoder, RejectsMalformedBytesOfParts) {
   refuses("part 1: its opacity is malformed", [](json& asset) { ours(asset)["parts"][1].erase("opacity"); });
 }
 
+TEST_F(MeshDecoder, RejectsViewsOfAPartWithoutPatches) {
+  for (const char* view : {"vertices", "features", "opacity", "encoder"}) {
+    refuses(std::string("part 0: it has ") + view + ", but no patches", [view](json& asset) {
+      json& spoilt = part(asset);
+      for (const char* key : {"patches", "pairs"}) spoilt[key] = 0;
+      for (const char* key : {"vertices", "features", "opacity"})
+        if (std::string_view(key) != view) spoilt.erase(key);
+      if (!spoilt.contains(view)) spoilt[view] = json::object();
+    });
+  }
+}
+
 class InferredMeshDecoder : public MeshDecoder {
  protected:
   Bytes file() const override { return encodeMesh(content_); }

@@ -97,7 +97,11 @@ class MeshReader {
       part.ranges[f] = {static_cast<float>((*ends)[0]), static_cast<float>((*ends)[1])};
     }
     if (!readLayers(getField(json, "network"), part.decoder, reason_)) return false;
-    if (const auto* encoder = getField(json, "encoder"); encoder && part.patches > 0) {
+    if (part.patches == 0) {
+      for (const char* const name : {"vertices", "features", "opacity", "encoder"})
+        if (getField(json, name)) return fail(fmt::format("part {}: it has {}, but no patches", number, name));
+    }
+    if (const auto* encoder = getField(json, "encoder")) {
       if (getField(json, "features") || getField(json, "opacity"))
         return failPart(number, "it has both an encoder and stored maps");
       if (!readEncoder(*encoder, part.encoder.emplace())) return failPart(number, "its encoder is malformed");

@@ -37,9 +37,8 @@ FieldConfig coarseConfig(const MeshConfig& config, const BlockGrid& grid) {
   return coarse;
 }
 
-// Trains the coarse field. Returns false if it was asked to stop.
-bool trainCoarseField(Device& device, const Capture& capture, const fs::path& model, const BlockGrid& grid,
-                      const MeshConfig& config, TrainingLoopOptions loop) {
+TrainingResult trainCoarseField(Device& device, const Capture& capture, const fs::path& model, const BlockGrid& grid,
+                                const MeshConfig& config, TrainingLoopOptions loop) {
   const ModelFolder folder = coarseFolder(model);
   FieldConfig coarse = coarseConfig(config, grid);
   const bool goesOn = folder.manifest().has_value();
@@ -52,11 +51,12 @@ bool trainCoarseField(Device& device, const Capture& capture, const fs::path& mo
   if (goesOn) {
     // A finished field stays as it is: parts were trained from it, and other processes may be reading it.
     const ModelManifest manifest = requireManifest(folder, "field");
-    if (manifest.plannedSteps > 0 && manifest.step >= manifest.plannedSteps) return true;
+    if (manifest.plannedSteps > 0 && manifest.step >= manifest.plannedSteps)
+      return {.step = manifest.step, .plannedSteps = manifest.plannedSteps, .finished = true};
     coarse.photoBudgetMiB = savedConfig<FieldConfig>(folder.root()).photoBudgetMiB;
     requireSameConfig(folder.root(), coarse);
   }
-  return trainField(device, capture, folder.root(), {coarse, loop}).finished;
+  return trainField(device, capture, folder.root(), {coarse, loop});
 }
 
 uint64_t viewSeed(const MeshConfig& config) {
@@ -85,10 +85,12 @@ void compareWithCoarseField(Device& device, const Capture& capture, const fs::pa
 
 }  // namespace
 
-void trainCoarseStage(Device& device, const Capture& capture, const fs::path& mesh, const BlockGrid& grid,
-                      const MeshConfig& config, const TrainingLoopOptions& loop) {
-  if (!trainCoarseField(device, capture, mesh, grid, config, loop)) throw StageStopped();
+TrainingResult trainCoarseStage(Device& device, const Capture& capture, const fs::path& mesh, const BlockGrid& grid,
+                                const MeshConfig& config, const TrainingLoopOptions& loop) {
+  const TrainingResult result = trainCoarseField(device, capture, mesh, grid, config, loop);
+  if (!result.finished) throw StageStopped();
   compareWithCoarseField(device, capture, mesh, config, loop);
+  return result;
 }
 
 Capture captureOfParts(const Capture& capture, const fs::path& mesh, const MeshConfig& config) {

@@ -10,11 +10,12 @@
 
 namespace tessera {
 
-// Makes all of it in the folder of the mesh, unless it has been made. `loop`: that of the whole training. Throws
-// StageStopped if it is asked to stop, and Error as trainField does, if a photo or mask cannot be read, or if a file
-// cannot be written.
-void trainCoarseStage(Device& device, const Capture& capture, const fs::path& mesh, const BlockGrid& grid,
-                      const MeshConfig& config, const TrainingLoopOptions& loop);
+// Makes all of it in the folder of the mesh, unless it has been made, and returns the result of training the coarse
+// field: without seconds and rates if it was complete before. `loop`: that of the whole training. Throws StageStopped
+// if it is asked to stop, and Error as trainField does, if a photo or mask cannot be read, or if a file cannot be
+// written.
+TrainingResult trainCoarseStage(Device& device, const Capture& capture, const fs::path& mesh, const BlockGrid& grid,
+                                const MeshConfig& config, const TrainingLoopOptions& loop);
 
 // Returns what the parts are trained on: the photos without what moves, and the views between them. Throws Error if a
 // list of files is malformed, or an image is missing.

@@ -145,6 +145,13 @@ int64_t stepsOfPart(const MeshConfig& config, const MeshPart& part, int64_t step
   return std::max<int64_t>(1, std::llround(static_cast<double>(ofBlock) * config.backgroundShare));
 }
 
+// Whether a finished part would be as long with these options (see runTraining). `steps`: of the part, with --steps.
+bool isAsLong(const ModelFolder& folder, int64_t steps, const ModelManifest& manifest,
+              const TrainingLoopOptions& options) {
+  if (options.minutes > 0) return folder.readPlan().has_value();  // else it has not been trained for minutes yet
+  return options.steps == 0 || manifest.step == steps;
+}
+
 // Returns the sum of these parts if nothing is left to train of them.
 std::optional<TrainingResult> findFinished(const fs::path& model, const std::vector<MeshPart>& parts,
                                            const TrainMeshOptions& options) {
@@ -154,11 +161,11 @@ std::optional<TrainingResult> findFinished(const fs::path& model, const std::vec
   sum.finished = true;
   for (const MeshPart& part : parts) {
     if (std::find(shown->begin(), shown->end(), part.name) == shown->end()) continue;
-    const std::optional<ModelManifest> manifest = partFolder(model, part).manifest();
+    const ModelFolder folder = partFolder(model, part);
+    const std::optional<ModelManifest> manifest = folder.manifest();
     if (!manifest || manifest->plannedSteps == 0 || manifest->step < manifest->plannedSteps) return std::nullopt;
-    const bool isAsLong = options.loop.minutes > 0 || options.loop.steps == 0 ||
-                          manifest->step == stepsOfPart(options.config, part, options.loop.steps);
-    if (!isAsLong) return std::nullopt;
+    if (!isAsLong(folder, stepsOfPart(options.config, part, options.loop.steps), *manifest, options.loop))
+      return std::nullopt;
     sum.step += manifest->step;
     sum.plannedSteps += manifest->plannedSteps;
   }
@@ -282,9 +289,10 @@ class PartsTraining {
     samples_ += samples;
     rays_ += samples / std::max(1e-9, result.samplesPerRay);
     inform("{}: {:.1f} hits a ray, {:.2f} M a second", part.name, result.samplesPerRay, result.samplesPerSecond / 1e6);
-    if (part.isBackground()) return;
+    if (part.isBackground() || !result.psnr) return;
     trainedPixels_ += pixels;
-    sum_.psnr += (result.psnr - sum_.psnr) * pixels / trainedPixels_;  // the mean by pixels
+    const double before = sum_.psnr.value_or(0);
+    sum_.psnr = before + (*result.psnr - before) * pixels / trainedPixels_;  // the mean by pixels
   }
 
   Device& device_;
@@ -302,14 +310,6 @@ class PartsTraining {
   double samples_ = 0, rays_ = 0, trainedPixels_ = 0;
 };
 
-TrainingResult toResult(const ModelManifest& manifest, bool finished) {
-  TrainingResult result;
-  result.step = manifest.step;
-  result.plannedSteps = manifest.plannedSteps;
-  result.finished = finished;
-  return result;
-}
-
 // Throws StageStopped.
 TrainingResult trainAllStages(Device& device, const Capture& given, const fs::path& model, TrainMeshOptions options) {
   const Stopwatch stopwatch;
@@ -326,7 +326,7 @@ TrainingResult trainAllStages(Device& device, const Capture& given, const fs::pa
   } else {
     beginRun(device, given, run, parts, options);
   }
-  trainCoarseStage(device, given, model, run.grid, config, options.loop);
+  const TrainingResult coarse = trainCoarseStage(device, given, model, run.grid, config, options.loop);
   const Capture capture = captureOfParts(given, model, config);
   // The budget counts the views between the photos, too, and decides on the order in which photos are drawn.
   const double photoBudgetMiB = resolvePhotoBudget(config.photoBudgetMiB, capture, options.bytesForPhotos());
@@ -338,7 +338,7 @@ TrainingResult trainAllStages(Device& device, const Capture& given, const fs::pa
   std::vector<MeshPart> requested;
   std::copy_if(parts.begin(), parts.end(), std::back_inserter(requested),
                [&](const MeshPart& part) { return options.requests(part.name); });
-  if (requested.empty()) return toResult(requireManifest(coarseFolder(model)), true);  // only the coarse field
+  if (requested.empty()) return coarse;
   if (run.goesOn)
     if (const auto finished = findFinished(model, requested, options)) return *finished;
   return PartsTraining(device, given, capture, run, options, stopwatch).train(parts);
@@ -351,7 +351,8 @@ TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path&
     return trainAllStages(device, capture, model, std::move(options));
   } catch (const StageStopped&) {
     const std::optional<ModelManifest> manifest = ModelFolder(model).manifest();
-    return manifest ? toResult(*manifest, false) : TrainingResult();
+    if (!manifest) return {};
+    return {.step = manifest->step, .plannedSteps = manifest->plannedSteps};
   }
 }
 

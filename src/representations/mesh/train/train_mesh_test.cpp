@@ -92,6 +92,41 @@ TEST_F(TrainMesh, TrainsPartsAloneToTheSameBytes) {
   EXPECT_EQ(lastCheckpoints(scene / "apart"), lastCheckpoints(scene / "whole"));
 }
 
+TEST_F(TrainMesh, StatesHowTheCoarseFieldWasTrained) {
+  TrainMeshOptions options = smallOptions();
+  options.only = {"coarse"};
+  const TrainingResult first = train("mesh", options);
+  EXPECT_TRUE(first.finished);
+  EXPECT_EQ(first.step, options.config.coarseSteps);
+  EXPECT_EQ(first.plannedSteps, options.config.coarseSteps);
+  EXPECT_GT(first.psnr.value_or(0), 3);
+  EXPECT_GT(first.seconds, 0);
+  EXPECT_GT(first.samplesPerSecond, 0);
+  EXPECT_GT(first.samplesPerRay, 0);
+  options.loop.resume = true;
+  const TrainingResult second = train("mesh", options);
+  EXPECT_TRUE(second.finished);
+  EXPECT_EQ(second.step, options.config.coarseSteps);
+  EXPECT_FALSE(second.psnr.has_value()) << "nothing was trained";
+  EXPECT_EQ(second.samplesPerSecond, 0);
+}
+
+TEST_F(TrainMesh, TrainsAFinishedRunOfStepsForMinutes) {
+  TrainMeshOptions options = smallOptions();
+  options.only = {"coarse", "block_1_0"};
+  EXPECT_TRUE(train("mesh", options).finished);
+  options.loop.resume = true;
+  options.loop.steps = 0;
+  options.loop.minutes = 0.05;
+  const TrainingResult longer = train("mesh", options);
+  EXPECT_TRUE(longer.finished);
+  EXPECT_GT(longer.step, kSteps);
+  EXPECT_TRUE(longer.psnr.has_value());
+  const auto checkpoints = lastCheckpoints(scene / "mesh");
+  EXPECT_EQ(train("mesh", options).step, longer.step) << "it has been trained for minutes, as planned";
+  EXPECT_EQ(lastCheckpoints(scene / "mesh"), checkpoints);
+}
+
 TEST_F(TrainMesh, StatesWhatIsLeftToTrain) {
   using testing::ElementsAre;
   TrainMeshOptions options = smallOptions();
