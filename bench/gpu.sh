@@ -59,7 +59,7 @@ commit=$(git rev-parse --short HEAD 2> /dev/null || echo unknown)
 work=$out/gpu
 bundle=$work/tessera-gpu-$commit
 rm -rf "$bundle"
-mkdir -p "$bundle"/{bin,lib,lib-c,lib-c++}
+mkdir -p "$bundle"/{bin,lib,lib-c,lib-c++,lib-gl}
 [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2 --size 400x300
 cp -r "$work/city" "$bundle/city"
 rm -r "$bundle/city/depths"  # four fifths of the city's size, and nothing here reads them
@@ -79,13 +79,23 @@ glibc=$(dirname "$(ldd "$tessera" | awk '$1 == "libc.so.6" { print $3 }')")
 for library in libc.so.6 libm.so.6 libmvec.so.1 libdl.so.2 libpthread.so.0 librt.so.1 libresolv.so.2 libutil.so.1 ld-linux-x86-64.so.2; do
   cp -L "$glibc/$library" "$bundle/lib-c/"
 done
-loader=$(ldconfig -p | awk '/libvulkan\.so\.1 / && /x86-64/ { path = $NF } END { print path }')
-[ -n "$loader" ] || die "libvulkan.so.1: not installed (apt-get install libvulkan1)"
-cp -L "$loader" "$bundle/lib/libvulkan.so.1"
-cp bench/gpu_run.sh "$bundle/run.sh"
+# installed LIBRARY PACKAGE: prints its path.
+installed() {
+  local path
+  path=$(ldconfig -p | awk -v name="$1" '$1 == name && /x86-64/ { path = $NF } END { print path }')
+  [ -n "$path" ] || die "$1: not installed (apt-get install $2)"
+  echo "$path"
+}
+cp -L "$(installed libvulkan.so.1 libvulkan1)" "$bundle/lib/"
+# NVIDIA's driver loads these even if nothing is shown, and machines without a screen often lack them.
+for library in libGLdispatch.so.0=libglvnd0 libEGL.so.1=libegl1 libGLX.so.0=libglx0 libGL.so.1=libgl1 libX11.so.6=libx11-6 \
+  libXext.so.6=libxext6 libxcb.so.1=libxcb1 libXau.so.6=libxau6 libXdmcp.so.6=libxdmcp6 libbsd.so.0=libbsd0 libmd.so.0=libmd0; do
+  cp -L "$(installed "${library%=*}" "${library#*=}")" "$bundle/lib-gl/"
+done
+install -m 755 bench/gpu_run.sh "$bundle/run.sh"
 cp LICENSE "$bundle/"
 echo "$commit" > "$bundle/commit"
-find "$bundle/bin" "$bundle/lib" -type f -exec objdump -T {} + 2> /dev/null |
+find "$bundle/bin" "$bundle/lib" "$bundle/lib-gl" -type f -exec objdump -T {} + 2> /dev/null |
   grep -o 'GLIBC_2\.[0-9]*' | sort -Vu | tail -1 | sed 's/GLIBC_//' > "$bundle/glibc"
 tar -C "$work" --sort=name -c "$(basename "$bundle")" | gzip -9 > "$bundle.tar.gz"
 megabytes=$(awk -v b="$(stat -c %s "$bundle.tar.gz")" 'BEGIN { printf "%.1f", b / 1e6 }')

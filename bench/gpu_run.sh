@@ -38,13 +38,26 @@ has_gpu() {
     /^  name/ { if (next_is && !/llvmpipe|SwiftShader/) found = 1; next_is = 0 } END { exit !found }'
 }
 # In a container, NVIDIA's driver often lacks the file that registers it with the Vulkan loader.
-if ! has_gpu && [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ]; then
+register_driver() {
+  local library
+  has_gpu && return
+  [ -z "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] || return 1
   for library in libGLX_nvidia.so.0 libEGL_nvidia.so.0; do
     printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "%s", "api_version": "1.2.0"}}\n' "$library" > "$work/icd.json"
     export VK_DRIVER_FILES=$work/icd.json VK_ICD_FILENAMES=$work/icd.json
-    has_gpu && break
+    has_gpu && return
     unset VK_DRIVER_FILES VK_ICD_FILENAMES
   done
+  return 1
+}
+# It may also lack libraries that the driver loads: those of the bundle take their place.
+if ! register_driver; then
+  mkdir "$work/gl"
+  for library in "$here"/lib-gl/*; do
+    ldconfig -p 2> /dev/null | awk -v name="${library##*/}" '$1 == name { found = 1 } END { exit !found }' || ln -s "$library" "$work/gl/"
+  done
+  given=$given:$work/gl
+  register_driver
 fi
 
 # Writes what is known so far, so that nothing is lost if the script is stopped.

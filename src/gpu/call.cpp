@@ -16,7 +16,8 @@ struct Meaning {
 
 constexpr Meaning kMeanings[] = {
     {VK_ERROR_INCOMPATIBLE_DRIVER, "no Vulkan driver is installed",
-     "install mesa-vulkan-drivers or the driver of the GPU, or use --device cpu"},
+     "install mesa-vulkan-drivers or the driver of the GPU (NVIDIA's also needs libegl1 and libgl1; "
+     "VK_LOADER_DEBUG=error shows why a driver does not load), or use --device cpu"},
     {VK_ERROR_INITIALIZATION_FAILED, "the driver could not start", "see what vulkaninfo says, or reinstall the driver"},
     {VK_ERROR_OUT_OF_DEVICE_MEMORY, "out of device memory",
      "train with fewer samples a step or smaller tables, render with a lower --memory-mib, or use --device cpu"},
