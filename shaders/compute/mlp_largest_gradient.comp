@@ -4,12 +4,11 @@
 #include "number.glsl"
 #include "kernel.glsl"
 #include "arguments_mlp.h"
-#include "mlp_output_gradient.glsl"
 
+const uint kThreads = 128;
 layout(local_size_x = 128) in;
+#include "mlp_output_gradient.glsl"
 KERNEL_ARGUMENTS(MlpLargestGradientArguments)
-
-shared float largest[128];
 
 void main() {
   MlpLargestGradientArguments a = arguments.values;
@@ -20,12 +19,6 @@ void main() {
       maximum = max(maximum, isNoNumber(size) ? uintBitsToFloat(0x7f800000u) : size);
     }
   }
-  largest[gl_LocalInvocationIndex] = maximum;
-  for (uint other = 64; other > 0; other /= 2) {
-    barrier();
-    if (gl_LocalInvocationIndex < other) {
-      largest[gl_LocalInvocationIndex] = max(largest[gl_LocalInvocationIndex], largest[gl_LocalInvocationIndex + other]);
-    }
-  }
-  if (gl_LocalInvocationIndex == 0) a.largest.values[gl_WorkGroupID.x] = largest[0];
+  maximum = groupMaximum(maximum);
+  if (gl_LocalInvocationIndex == 0) a.largest.values[gl_WorkGroupID.x] = maximum;
 }

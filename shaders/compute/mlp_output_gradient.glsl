@@ -1,6 +1,7 @@
 // Gradients of an MLP's output layer with respect to the values before its activation, and the scale that keeps the
 // gradients of all layers within fp16.
-// Include after arguments_mlp.h. Defines: outputGradient(), lossScale().
+// Include after arguments_mlp.h. Reads: kThreads, the size of a workgroup, a power of two. Defines: outputGradient(),
+// groupMaximum(), lossScale().
 
 // Returns 0 for padding columns.
 float outputGradient(MlpOutputArguments a, uint row, uint column) {
@@ -14,13 +15,30 @@ float outputGradient(MlpOutputArguments a, uint row, uint column) {
   return gradient;
 }
 
+shared float maxima[kThreads];
+
+// Returns the largest value of a workgroup's invocations, which must call it together.
+float groupMaximum(float value) {
+  maxima[gl_LocalInvocationIndex] = value;
+  for (uint other = kThreads / 2; other > 0; other /= 2) {
+    barrier();
+    if (gl_LocalInvocationIndex < other) {
+      maxima[gl_LocalInvocationIndex] = max(maxima[gl_LocalInvocationIndex], maxima[gl_LocalInvocationIndex + other]);
+    }
+  }
+  barrier();
+  return maxima[0];
+}
+
 // Returns a power of two that scales the largest of `largest` to [64, 128): earlier layers may increase it a few
 // hundred times, and numbers 2⁻²⁰ times smaller still have full fp16 precision. As the scale is computed from the
 // gradients themselves, it needs neither history nor skipped steps. Returns 1 for an empty list, and NaN if a value is
 // infinite, so that all gradients become NaN.
+// All invocations of a workgroup must call it together.
 float lossScale(FloatPointer largest, uint count) {
   float maximum = 0;
-  for (uint i = 0; i < count; ++i) maximum = max(maximum, largest.values[i]);
+  for (uint i = gl_LocalInvocationIndex; i < count; i += kThreads) maximum = max(maximum, largest.values[i]);
+  maximum = groupMaximum(maximum);
   const int exponent = int(floatBitsToUint(maximum) >> 23) - 127;
   if (maximum == 0) return 1;
   if (exponent == 128) return uintBitsToFloat(0x7fc00000u);

@@ -6,12 +6,12 @@
 #include "number.glsl"
 #include "kernel.glsl"
 #include "arguments_mlp.h"
-#include "mlp_output_gradient.glsl"
 
 const uint kQuads = 8;    // vectors of four along a side of the tile
 const uint kDepth = 16;   // samples at a time
 const uint kThreads = 64;
 layout(local_size_x = 64) in;
+#include "mlp_output_gradient.glsl"
 KERNEL_ARGUMENTS(MlpWeightGradientsArguments)
 
 shared NumberQuad afterTile[kDepth * kQuads];

@@ -6,8 +6,8 @@
 #include "number.glsl"
 #include "kernel.glsl"
 #include "arguments_mlp.h"
-#include "mlp_output_gradient.glsl"
 #include "matrix_tiles.glsl"
+#include "mlp_output_gradient.glsl"
 
 const uint kDepth = 64;  // samples at a time
 layout(constant_id = 0) const uint kRows = 64;  // multiples of 16
@@ -31,8 +31,8 @@ uint tileRow(uint r) { return (kSubgroup % kRowShares + r * kRowShares) * kTileR
 
 // Loads samples [first, first + 64); those beyond the last are zero.
 void load(MlpWeightGradientsArguments a, uint first, uint samples, uint firstRow, uint firstColumn) {
-  for (uint i = gl_LocalInvocationIndex; i < kDepth * kRows / 4; i += kThreads) {
-    const uint index = first + i / (kRows / 4), quad = i % (kRows / 4);
+  [[unroll]] for (uint n = 0; n < kDepth * kRows / 4 / kThreads; ++n) {
+    const uint i = n * kThreads + gl_LocalInvocationIndex, index = first + i / (kRows / 4), quad = i % (kRows / 4);
     const f16vec4 four = index < samples ? QuadPointer(a.after).values[(index * a.rows + firstRow) / 4 + quad] : f16vec4(0);
     [[unroll]] for (uint k = 0; k < 4; ++k) afterTile[i / (kRows / 4) * kRowStride + 4 * quad + k] = four[k];
   }
@@ -40,7 +40,8 @@ void load(MlpWeightGradientsArguments a, uint first, uint samples, uint firstRow
     for (uint column = gl_LocalInvocationIndex % 16; column < kColumns; column += 16) {
       const bool has = firstColumn + column < a.inputs.columns;
       const uint offset = has ? columnOffset(a.inputs, firstColumn + column) : 0;
-      for (uint i = gl_LocalInvocationIndex / 16; i < kDepth; i += kThreads / 16) {
+      [[unroll]] for (uint n = 0; n < kDepth * 16 / kThreads; ++n) {
+        const uint i = n * kThreads / 16 + gl_LocalInvocationIndex / 16;
         const bool inside = has && first + i < samples;
         beforeTile[i * kColumnStride + column] =
             toNumber(inside ? a.inputs.data.values[offset + (first + i) * a.inputs.rowStride] : 0);
@@ -48,8 +49,8 @@ void load(MlpWeightGradientsArguments a, uint first, uint samples, uint firstRow
     }
     return;
   }
-  for (uint i = gl_LocalInvocationIndex; i < kDepth * kColumns / 4; i += kThreads) {
-    const uint index = first + i / (kColumns / 4), quad = i % (kColumns / 4);
+  [[unroll]] for (uint n = 0; n < kDepth * kColumns / 4 / kThreads; ++n) {
+    const uint i = n * kThreads + gl_LocalInvocationIndex, index = first + i / (kColumns / 4), quad = i % (kColumns / 4);
     const f16vec4 four =
         index < samples ? QuadPointer(a.activations).values[(index * a.columns + firstColumn) / 4 + quad] : f16vec4(0);
     [[unroll]] for (uint k = 0; k < 4; ++k) beforeTile[i / (kColumns / 4) * kColumnStride + 4 * quad + k] = four[k];

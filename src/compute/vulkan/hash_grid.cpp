@@ -56,7 +56,8 @@ void VulkanDevice::enqueue(const HashGridBackward& options) {
   const std::vector<uint32_t> constants = {static_cast<uint32_t>(grid.features)};
   if (options.tableGradients) {
     queue(sumKernel(kHashGridBackwardFloatAtomicsSpirv, kHashGridBackwardSpirv, constants), arguments,
-          countGroups(options.samples, kHashGridSamplesPerGroup, 1, arguments.levelCount));
+          countGroups(options.samples, kHashGridSamplesPerGroup, 2 * static_cast<uint32_t>(grid.features),
+                      arguments.levelCount));
   }
   if (options.positionGradients) {
     queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments,

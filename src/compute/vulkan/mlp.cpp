@@ -36,10 +36,10 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kWeightTile = 32;         // mlp_weight_gradients.comp: a workgroup sums a tile of 32 × 32 weights
-constexpr uint32_t kSamplesPerShare = 1024;  // the minimum number of samples that one of its workgroups sums
-constexpr uint32_t kMaxShares = 64;          // the maximum number of workgroups that add to one weight
-constexpr uint32_t kScaleGroups = 64;        // workgroups of mlp_largest_gradient.comp
+constexpr uint32_t kWeightTile = 32;        // mlp_weight_gradients.comp: a workgroup sums a tile of 32 × 32 weights
+constexpr uint32_t kSamplesPerShare = 256;  // the minimum number of samples that one of its workgroups sums
+constexpr uint32_t kMaxShares = 1024;       // the maximum number of workgroups that add to one weight
+constexpr uint32_t kScaleGroups = 512;      // workgroups of mlp_largest_gradient.comp
 
 #ifdef TESSERA_KHR_MATRICES
 constexpr std::span<const uint32_t> kForwardByKhr = kMlpForwardKhrMatricesSpirv;
