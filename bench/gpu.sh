@@ -23,8 +23,8 @@ judge() {
     jq --arg o "$1" --arg s "$2" "$rows | map(.$3) | min // -0.01 | . * 1000 | round / 10" "$all"
   }
   echo "GPU: $(jq -r .compute.device "$all"), commit $(jq -r .commit "$all")"
-  holds_of "operations that agree with the reference" .values_passed 200
-  verdict "operations that do not" "$(jq '.values_failed | if . == null then 1 else length end' "$all")" '<=' 0
+  holds_of "tests of operations and drawing that pass" .values_passed 200
+  verdict "those that fail" "$(jq '.values_failed | if . == null then 1 else length end' "$all")" '<=' 0
   holds_of "fox held out, field, dB" .fox_field_psnr 27
   verdict "operations that were timed" \
     "$(jq '[(.compute.operations // [])[].operation | select(. != "Mlp both")] | unique | length' "$all")" '>=' 48
@@ -53,8 +53,10 @@ judge() {
 [ -z "${JUDGE:-}" ] || { judge $JUDGE; finish; exit 0; }
 need_tessera
 build=${BUILD:-build/release}
-test=$build/src/compute/tessera_devices_test
-[ -x "$test" ] || die "$test: not built; configure with TESSERA_VULKAN=ON and TESSERA_TESTS=ON"
+tests=("$build"/src/compute/tessera_devices_test "$build"/src/compute/vulkan/tessera_compute_vulkan_test "$build"/tests/tessera_gpu_drawing_test)
+for test in "${tests[@]}"; do
+  [ -x "$test" ] || die "$test: not built; configure with TESSERA_VULKAN=ON and TESSERA_TESTS=ON"
+done
 commit=$(git rev-parse --short HEAD 2> /dev/null || echo unknown)
 work=$out/gpu
 bundle=$work/tessera-gpu-$commit
@@ -64,11 +66,11 @@ mkdir -p "$bundle"/{bin,lib,lib-c,lib-c++,lib-gl}
 cp -r "$work/city" "$bundle/city"
 rm -r "$bundle/city/depths"  # four fifths of the city's size, and nothing here reads them
 jq -c 'del(.frames[].depth_file_path)' "$work/city/transforms.json" > "$bundle/city/transforms.json"
-for program in "$tessera" "$test"; do
+for program in "$tessera" "${tests[@]}"; do
   strip -o "$bundle/bin/$(basename "$program")" "$program"
 done
 # glibc and the C++ library are packed separately: the driver is linked to the machine's, which may be newer.
-ldd "$tessera" "$test" | awk '$3 ~ /^\// { print $3 }' | sort -u | while read -r library; do
+ldd "$tessera" "${tests[@]}" | awk '$3 ~ /^\// { print $3 }' | sort -u | while read -r library; do
   case "$(basename "$library")" in
     libc.so.* | libm.so.* | libdl.so.* | libpthread.so.* | librt.so.* | ld-linux*) ;;  # packed below, as a whole
     libstdc++.so.* | libgcc_s.so.*) cp -L "$library" "$bundle/lib-c++/" ;;

@@ -97,13 +97,18 @@ read -ra samples <<< "${SAMPLES:-65536 1048576}"
 length=${LENGTH:---minutes $(awk -v s="$seconds" 'BEGIN { print s / 60 }')}
 
 values() {
-  step "every operation against the reference"
-  TESSERA_REQUIRE_VULKAN=1 start tessera_devices_test --gtest_brief=1 --gtest_filter='*vulkan*' > "$work/values.txt" 2>&1
-  local status=$?
-  number values_status "$status"
-  [ "$status" -eq 0 ] || failed+=("$(quoted "values: status $status")")
-  grep -E '^\[  (PASSED|FAILED)' "$work/values.txt"
-  number values_passed "$(sed -n 's/^\[  PASSED  \] \([0-9]*\) test.*/\1/p' "$work/values.txt" | head -1)"
+  step "every operation against the reference, and scenes drawn by the GPU against the CPU"
+  local program filter status all=0
+  local -A only=([tessera_devices_test]='*vulkan*' [tessera_compute_vulkan_test]='*' [tessera_gpu_drawing_test]='*')
+  for program in "${!only[@]}"; do
+    filter=${only[$program]} status=0
+    TESSERA_REQUIRE_VULKAN=1 start "$program" --gtest_brief=1 --gtest_filter="$filter" >> "$work/values.txt" 2>&1 || status=$?
+    [ "$status" -eq 0 ] || failed+=("$(quoted "values, $program: status $status")")
+    all=$((all > status ? all : status))
+  done
+  number values_status "$all"
+  grep -E '^\[  (PASSED|FAILED|SKIPPED)' "$work/values.txt"
+  number values_passed "$(awk '/^\[  PASSED  \] [0-9]+ test/ { sum += $4 } END { print sum + 0 }' "$work/values.txt")"
   members+=("\"values_failed\": [$(sed -n 's/^\[  FAILED  \] \([^ ,]*\).*/"\1"/p' "$work/values.txt" | sort -u | paste -sd, -)]")
   cp "$work/values.txt" "$out/values.txt"
 }
