@@ -54,7 +54,7 @@ register_driver() {
 if ! register_driver; then
   mkdir "$work/gl"
   for library in "$here"/lib-gl/*; do
-    ldconfig -p 2> /dev/null | awk -v name="${library##*/}" '$1 == name { found = 1 } END { exit !found }' || ln -s "$library" "$work/gl/"
+    PATH=$PATH:/sbin:/usr/sbin ldconfig -p | awk -v name="${library##*/}" '$1 == name && /x86-64/ { found = 1 } END { exit !found }' || ln -s "$library" "$work/gl/"
   done
   given=$given:$work/gl
   register_driver

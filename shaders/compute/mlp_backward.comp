@@ -22,12 +22,15 @@ void storeSum(uint row, uint column, float sum) {
 void loadOutputGradients(MlpBackwardArguments a, float scale, uint firstSample, uint samples) {
   barrier();
   for (uint column = gl_LocalInvocationIndex % 16; column < a.paddedOutputs; column += 16) {
-    [[unroll]] for (uint n = 0; n < kBlock * 16 / kThreads; ++n) {  // as many loads in flight as possible
-      const uint row = n * kThreads / 16 + gl_LocalInvocationIndex / 16;
-      const uint index = firstSample + row;
-      const Number gradient = toNumber(index < samples ? scale * outputGradient(a.last, index, column) : 0);
-      if (index < samples) a.lastGradients.values[index * a.paddedOutputs + column] = gradient;
-      STATE(row, column) = gradient;
+    Number gradients[kBlock * 16 / kThreads];  // all loads come before the first store, and so overlap
+    [[unroll]] for (uint n = 0; n < kBlock * 16 / kThreads; ++n) {
+      const uint index = firstSample + n * kThreads / 16 + gl_LocalInvocationIndex / 16;
+      gradients[n] = toNumber(index < samples ? scale * outputGradient(a.last, index, column) : 0);
+    }
+    [[unroll]] for (uint n = 0; n < kBlock * 16 / kThreads; ++n) {
+      const uint row = n * kThreads / 16 + gl_LocalInvocationIndex / 16, index = firstSample + row;
+      if (index < samples) a.lastGradients.values[index * a.paddedOutputs + column] = gradients[n];
+      STATE(row, column) = gradients[n];
     }
   }
 }
@@ -44,12 +47,16 @@ void backward(MlpBackwardArguments a, float scale, uint firstSample, uint sample
     storeSumsToState(false);
     barrier();
     const uint base = ((layer - 1) * a.last.samples.capacity + firstSample) * kWidth / 4;
+    NumberQuad activations[kBlock * kWidth / 4 / kThreads];  // as above
+    [[unroll]] for (uint n = 0; n < kBlock * kWidth / 4 / kThreads; ++n) {
+      const uint i = n * kThreads + gl_LocalInvocationIndex;
+      activations[n] = i < rows * kWidth / 4 ? a.activations.values[base + i] : NumberQuad(0);
+    }
     [[unroll]] for (uint n = 0; n < kBlock * kWidth / 4 / kThreads; ++n) {
       const uint i = n * kThreads + gl_LocalInvocationIndex, row = i / (kWidth / 4), quad = i % (kWidth / 4);
       if (row >= rows) break;
-      const NumberQuad activation = a.activations.values[base + i];
       // The gradient is zero where ReLU was inactive.
-      const NumberQuad gradient = mix(NumberQuad(0), STATE_QUAD(row, quad), greaterThan(activation, NumberQuad(0)));
+      const NumberQuad gradient = mix(NumberQuad(0), STATE_QUAD(row, quad), greaterThan(activations[n], NumberQuad(0)));
       SET_STATE_QUAD(row, quad, gradient);
       a.hiddenGradients.values[base + i] = gradient;
     }

@@ -22,7 +22,7 @@ void loadInput(MatrixArguments m, uint firstSample, uint samples, uint first, ui
   for (uint column = gl_LocalInvocationIndex % 16; column < count; column += 16) {
     const bool exists = first + column < m.columns;
     const uint offset = exists ? columnOffset(m, first + column) : 0;
-    [[unroll]] for (uint n = 0; n < kBlock * 16 / kThreads; ++n) {  // as many loads in flight as possible
+    [[unroll]] for (uint n = 0; n < kBlock * 16 / kThreads; ++n) {  // the loads overlap
       const uint row = n * kThreads / 16 + gl_LocalInvocationIndex / 16;
       const bool inside = exists && firstSample + row < samples;
       STATE(row, column) = toNumber(inside ? m.data.values[offset + (firstSample + row) * m.rowStride] : 0);

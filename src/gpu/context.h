@@ -51,8 +51,9 @@ struct GpuMatrices {
   enum class Kind { none, nv, khr };  // VK_NV_cooperative_matrix; VK_KHR_cooperative_matrix if the build supports it
   Kind kind = Kind::none;
   uint32_t rows = 16, columns = 16, depth = 16;
-  uint32_t subgroupSize = 32;                // required by the kernels that use them
-  static constexpr uint32_t kSubgroups = 4;  // per workgroup of these kernels
+  uint32_t subgroupSize = 32;                   // required by the kernels that use them
+  static constexpr uint32_t kSubgroups = 4;     // per workgroup of these kernels
+  static constexpr uint32_t kMaxThreads = 256;  // per workgroup: they divide a block of samples evenly
 };
 
 struct GpuOptions {

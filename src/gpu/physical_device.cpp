@@ -135,8 +135,8 @@ uint32_t settledSubgroupSize(VkPhysicalDevice device) {
   vkGetPhysicalDeviceProperties2(device, &properties);
   if (!(sizes.requiredSubgroupSizeStages & VK_SHADER_STAGE_COMPUTE_BIT)) return 0;
   const uint32_t size = std::clamp(subgroup.subgroupSize, sizes.minSubgroupSize, sizes.maxSubgroupSize);
-  const bool fits = GpuMatrices::kSubgroups * size <= properties.properties.limits.maxComputeWorkGroupInvocations;
-  return fits ? size : 0;
+  const uint32_t most = std::min(GpuMatrices::kMaxThreads, properties.properties.limits.maxComputeWorkGroupInvocations);
+  return GpuMatrices::kSubgroups * size <= most ? size : 0;
 }
 
 // Both extensions describe matrices in the same way with different names.

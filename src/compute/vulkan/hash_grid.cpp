@@ -11,7 +11,7 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kHashGridSamplesPerGroup = 128;  // local_size_x of the kernels
+constexpr uint32_t kHashGridInvocationsPerGroup = 128;  // local_size_x of the kernels
 
 void setLevels(const HashGrid& grid, arguments::LevelArguments* levels) {
   CHECK(grid.levels.size() <= size_t{TESSERA_MAX_LEVELS});
@@ -36,7 +36,7 @@ void VulkanDevice::enqueue(const HashGridForward& options) {
   arguments.encoded = matrixArguments(options.encoded, options.samples.capacity);
   setLevels(grid, arguments.levels);
   queue(kernel(kHashGridForwardSpirv, {static_cast<uint32_t>(grid.features)}), arguments,
-        countGroups(options.samples, kHashGridSamplesPerGroup, 1, static_cast<uint32_t>(grid.levels.size())));
+        countGroups(options.samples, kHashGridInvocationsPerGroup, 1, static_cast<uint32_t>(grid.levels.size())));
 }
 
 template <>
@@ -56,12 +56,12 @@ void VulkanDevice::enqueue(const HashGridBackward& options) {
   const std::vector<uint32_t> constants = {static_cast<uint32_t>(grid.features)};
   if (options.tableGradients) {
     queue(sumKernel(kHashGridBackwardFloatAtomicsSpirv, kHashGridBackwardSpirv, constants), arguments,
-          countGroups(options.samples, kHashGridSamplesPerGroup, 2 * static_cast<uint32_t>(grid.features),
+          countGroups(options.samples, kHashGridInvocationsPerGroup, 2 * static_cast<uint32_t>(grid.features),
                       arguments.levelCount));
   }
   if (options.positionGradients) {
     queue(kernel(kHashGridPositionGradientsSpirv, constants), arguments,
-          countGroups(options.samples, kHashGridSamplesPerGroup));
+          countGroups(options.samples, kHashGridInvocationsPerGroup));
   }
 }
 

@@ -36,10 +36,10 @@ namespace tessera {
 
 namespace {
 
-constexpr uint32_t kWeightTile = 32;        // mlp_weight_gradients.comp: a workgroup sums a tile of 32 × 32 weights
-constexpr uint32_t kSamplesPerShare = 256;  // the minimum number of samples that one of its workgroups sums
-constexpr uint32_t kMaxShares = 1024;       // the maximum number of workgroups that add to one weight
-constexpr uint32_t kScaleGroups = 512;      // workgroups of mlp_largest_gradient.comp
+constexpr uint32_t kWeightTile = 32;  // mlp_weight_gradients.comp: a workgroup sums a tile of 32 × 32 weights
+// The workgroups that add to one weight, each with a share of the samples; fewer where they would wait for each other.
+constexpr uint32_t kSamplesPerShare = 256, kMaxShares = 1024, kMaxSharesWithoutFloatAtomics = 64;
+constexpr uint32_t kScaleGroups = 512;  // workgroups of mlp_largest_gradient.comp
 
 #ifdef TESSERA_KHR_MATRICES
 constexpr std::span<const uint32_t> kForwardByKhr = kMlpForwardKhrMatricesSpirv;
@@ -232,8 +232,9 @@ void VulkanDevice::enqueue(const MlpBackward& options) {
 }
 
 void VulkanDevice::queueWeightGradients(const arguments::MlpWeightGradientsArguments& sums, size_t capacity) {
-  const uint32_t shares = std::clamp<uint32_t>(groups(capacity, kSamplesPerShare), 1, kMaxShares);
   const bool atomics = stream_->context()->features().floatAtomics;
+  const uint32_t shares =
+      std::clamp<uint32_t>(groups(capacity, kSamplesPerShare), 1, atomics ? kMaxShares : kMaxSharesWithoutFloatAtomics);
   uint32_t tileRows = 0, tileColumns = 0;
   const auto make = [&]() -> const GpuKernel* {
     tileRows = tileColumns = kWeightTile;
