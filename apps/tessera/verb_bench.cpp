@@ -129,11 +129,12 @@ ordered_json measureFrames(const Device& device, const fs::path& scene, const st
   std::string name;
 #ifdef TESSERA_HAS_VULKAN
   std::unique_ptr<GpuSceneRenderer> onGpu;
-  const bool isDrawn = hasGpuDrawer(readTileset(scene).representation);
+  const std::string representation = readTileset(scene).representation;
+  const bool isDrawn = hasGpuDrawer(representation);
   if (const auto context = vulkanContext(device); context && isDrawn) {
     GpuRendererSettings settings;
     settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
-    settings.budgetBytes = sceneBudgetBytes(device);
+    settings.budgetBytes = sceneBudgetBytes(device, representation);
     onGpu = openGpuScene(context, scene, settings);
     draw = [&](const BenchmarkView& view) { onGpu->draw(view.camera, view.worldFromCamera); };
     wait = [context] { context->waitIdle(); };
