@@ -57,6 +57,7 @@ std::unique_ptr<ViewRenderer> withWarnings(const fs::path& folder, const Tileset
   return std::make_unique<WarningRenderer<Renderer>>(folder, tileset, budgetBytes, std::move(renderer));
 }
 
+// Whether the GPU of the device draws scenes of this representation; else the CPU does.
 bool isDrawnOnGpu([[maybe_unused]] const Device& device, [[maybe_unused]] std::string_view representation) {
 #ifdef TESSERA_HAS_VULKAN
   return vulkanContext(device) && hasGpuDrawer(representation);

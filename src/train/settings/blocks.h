@@ -9,7 +9,7 @@ namespace tessera {
 struct BackgroundBlockSettings {
   SETTING(std::string, backgroundBlock, "own", "background_block",
           "what represents the space outside the region: own (a separate background block), border (the blocks at "
-          "the border, as in the papers; only if all blocks are trained together, not of mesh) or none",
+          "the border, as in the papers; only if all blocks are trained together, which mesh does not) or none",
           anything());  // see parseBackgroundBlockMode
 };
 
