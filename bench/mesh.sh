@@ -536,8 +536,8 @@ vulkan() {
   block
   local device
   for device in cpu vulkan; do
-    trained "vulkan-$device" block --method mesh --steps 300 --set coarse_steps=300 --set samples_per_step=16384 \
-      "${short_schedule[@]}" --device "$device"
+    trained "vulkan-$device" block --method mesh --blocks 1x1 --steps 300 --set coarse_steps=300 \
+      --set samples_per_step=16384 "${short_schedule[@]}" --device "$device"
     [ -s "$work/vulkan-$device.json" ] ||
       "$tessera" eval "$work/vulkan-$device" "$work/block" --split train --json "$work/vulkan-$device.json" > /dev/null
   done
