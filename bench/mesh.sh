@@ -34,6 +34,8 @@
 #                triangles, and baking at three: equal bytes
 #   memory       peak memory of baking six blocks, of rendering their model, and of both for one block
 #   vulkan       300 steps with `vulkan` against `cpu`: PSNR of the training photos
+#   frames       images of that scene on a GPU, or on a Vulkan driver for the CPU, against those on the CPU: exact ones, the
+#                mean of 64 dithered frames, and each frame of a flight
 #   fallback     the ordinary glTF meshes in the contents of that scene's finest level, in Blender, assimp and three.js: they load with
 #                the same numbers of triangles; and held-out views of three.js and Blender, without mipmaps and antialiasing, against
 #                the scene without view dependence (every hit has the base colour of its texels), the scene as it is, an
@@ -585,6 +587,22 @@ holes() {
   done
 }
 
+frames() {
+  need_tessera
+  local program=build/release/bench/mesh_frames result=$work/frames.json
+  [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_frames"
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  [ -s "$result" ] || "$program" "$work/city-mesh.scene" "$work/city" > "$result"
+  jq -c . "$result"
+  verdict "exact images, least PSNR of a held-out view" "$(jq .exact.least "$result")" '>=' 38
+  verdict "the same through the photos' lens" "$(jq .exact_through_lens.least "$result")" '>=' 38
+  verdict "mean of 64 frames" "$(jq '."64_frames".least' "$result")" '>=' 38
+  verdict "frames of a flight" "$(jq .flight.without_jitter.least "$result")" '>=' 30
+  verdict "largest loss of a frame by blending, dB" "$(jq .flight.largest_loss_without_jitter "$result")" '<=' 0.5
+}
+
 # withoutMasks FROM TO: copies a capture without its masks.
 withoutMasks() {
   rm -rf "$2.part"
@@ -732,7 +750,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan fallback yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan frames fallback yardstick fox beach}; do
   "$row"
 done
 finish

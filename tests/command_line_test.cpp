@@ -145,8 +145,8 @@ TEST_F(CommandLine, HelpOfEveryVerbHasDefaultsAndAnExample) {
 
 #define NAME(name, Name) #name,
 #define SKIP(name, Name)
-const std::vector<std::string> kMethods = {TESSERA_REPRESENTATIONS(NAME, NAME, NAME)};
-const std::vector<std::string> kBakedMethods = {TESSERA_REPRESENTATIONS(SKIP, NAME, NAME)};
+const std::vector<std::string> kMethods = {TESSERA_REPRESENTATIONS(NAME, NAME)};
+const std::vector<std::string> kBakedMethods = {TESSERA_REPRESENTATIONS(SKIP, NAME)};
 #undef SKIP
 #undef NAME
 

@@ -9,6 +9,9 @@
 #include "representations/hash/testing/hash_renderer.h"
 #include "representations/hash/testing/test_hash_content.h"
 #include "representations/hash/vulkan/gpu_hash_drawer.h"
+#include "representations/mesh/cpu/mesh_drawer.h"
+#include "representations/mesh/testing/random_mesh.h"
+#include "representations/mesh/vulkan/gpu_mesh_drawer.h"
 #include "representations/volume/testing/test_scene.h"
 #include "representations/volume/testing/volume_renderer.h"
 #include "representations/volume/vulkan/gpu_volume_drawer.h"
@@ -89,6 +92,54 @@ void withoutLogitColumns(HashContent& content) {
   }
 }
 
+// 2x2 cells of random triangles, which reach into other cells, below one content of all of them, and a background block
+// with a sky.
+struct MeshPlace {
+  TileTree tree = testTree(2, 2);
+  std::vector<MeshContent> contents;
+  TileFrame frame;
+  uint64_t allBytes = 0, coarsestBytes = 0;
+
+  MeshPlace() {
+    frame.low = Vec3d(-2, -2, -1);
+    frame.high = Vec3d(2, 2, 1);
+    for (TileNode& node : tree.tiles) {
+      MeshContent content = tiles_test::randomMeshContent(contents.size(), 3);
+      const double growth = node.level == 0 ? 1 : 2;
+      for (PatchSet& part : content.parts) {
+        part.step *= growth;
+        for (int axis = 0; axis < 3; ++axis)
+          part.origin[axis] = growth * part.origin[axis] + (node.low[axis] + node.high[axis]) / 2;
+      }
+      add(std::move(content));
+      node.geometricError = 2.0 / 64 * (1 << node.level);
+      if (node.parent < 0) coarsestBytes += bytesInMemory(contents.back());
+    }
+    MeshContent around = tiles_test::randomMeshContent(1000, 3, true);
+    for (PatchSet& part : around.parts) {
+      part.step *= 8;
+      for (double& number : part.origin) number *= 8;
+    }
+    add(std::move(around));
+    coarsestBytes += bytesInMemory(contents.back());
+    tree.backgroundBlock = static_cast<int>(tree.tiles.size());
+    tree.tiles.emplace_back().isBackgroundBlock = true;
+  }
+  void add(MeshContent content) {
+    allBytes += bytesInMemory(content);
+    contents.push_back(std::move(content));
+  }
+  TileSource<Content> source() const {
+    return sourceOfCopies([this](int tile) -> const MeshContent& { return contents[tile]; });
+  }
+};
+
+class MeshRenderer final : public SceneRenderer {
+ public:
+  MeshRenderer(const TileFrame& frame, TileTree tree, TileSource<Content> source, const SceneRendererSettings& settings)
+      : SceneRenderer(makeMeshDrawer(), frame, std::move(tree), std::move(source), settings) {}
+};
+
 class GpuDrawing : public testing::Test {
  protected:
   void SetUp() override {
@@ -104,6 +155,11 @@ class GpuDrawing : public testing::Test {
   GpuSceneRenderer onGpu(const HashPlace& place, const GpuRendererSettings& settings) {
     const auto stream = std::make_shared<GpuStream>(context_);
     return {stream, makeGpuHashDrawer(stream), {place.frame, place.tree, place.source(), {}}, settings};
+  }
+
+  GpuSceneRenderer onGpu(const MeshPlace& place, const GpuRendererSettings& settings) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    return {stream, makeGpuMeshDrawer(stream), {place.frame, place.tree, place.source(), {}}, settings};
   }
 
   // Compares the images of both renderers along a flight.
@@ -193,6 +249,86 @@ TEST_F(GpuDrawing, ShowsTheLearnedBackgroundOfHashWhereNothingIs) {
   compare<HashRenderer>(whole, whole.allBytes, 1.5);
   const ImageF opaque = opaqueOnTheLeft();
   compare<HashRenderer>(whole, whole.allBytes, 16, &opaque);
+}
+
+// Compares images of triangles, which may differ in a few pixels: a rasteriser rounds positions of corners, and so
+// moves edges by a fraction of a pixel.
+void expectSamePixels(const RenderedView& actual, const RenderedView& expected, double share) {
+  int differences = 0;
+  for (int y = 0; y < expected.colour.height; ++y) {
+    for (int x = 0; x < expected.colour.width; ++x) {
+      float largest = std::abs(*actual.opacity.at(x, y) - *expected.opacity.at(x, y));
+      for (int c = 0; c < 3; ++c)
+        largest = std::max(largest, std::abs(actual.colour.at(x, y)[c] - expected.colour.at(x, y)[c]));
+      const float depth = *expected.depth.at(x, y);
+      if (largest > 2e-3f || std::abs(*actual.depth.at(x, y) - depth) > 2e-3f * std::max(1.0f, depth)) ++differences;
+    }
+  }
+  EXPECT_LE(differences, share * expected.opacity.pixels.size());
+}
+
+TEST_F(GpuDrawing, DrawsMeshAsTheCpuDoes) {
+  const MeshPlace mesh;
+  const ImageF opaque = opaqueOnTheLeft();
+  for (const ImageF* const end : {static_cast<const ImageF*>(nullptr), &opaque}) {
+    for (const double error : {0.5, 16.0}) {
+      SceneRendererSettings settings;
+      // CPU contents take more memory, so both have enough for all.
+      settings.selection.maximumScreenSpaceError = error;
+      MeshRenderer oracle(mesh.frame, mesh.tree, mesh.source(), settings);
+      GpuRendererSettings ofGpu;
+      ofGpu.selection = settings.selection;
+      GpuSceneRenderer gpu = onGpu(mesh, ofGpu);
+      for (int step = 0; step < 600; step += 75) {
+        SCOPED_TRACE(step);
+        expectSamePixels(gpu.render(flightCamera(), flightPose(step), end),
+                         oracle.render(flightCamera(), flightPose(step), end), 0.005);
+      }
+    }
+  }
+}
+
+TEST_F(GpuDrawing, DrawsMeshInStripsIfItsFragmentsDoNotFitIntoMemory) {
+  const MeshPlace mesh;
+  const auto draw = [&](uint32_t listedFragments) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    GpuSceneRenderer gpu(stream, makeGpuMeshDrawer(stream, {.listedFragments = listedFragments}),
+                         {mesh.frame, mesh.tree, mesh.source(), {}}, {});
+    return gpu.render(flightCamera(), flightPose(0), nullptr);
+  };
+  const RenderedView whole = draw(0), inStrips = draw(2000);
+  EXPECT_EQ(inStrips.colour.pixels, whole.colour.pixels);
+  EXPECT_EQ(inStrips.opacity.pixels, whole.opacity.pixels);
+  EXPECT_THROW(draw(2), Error);
+}
+
+TEST_F(GpuDrawing, DitheredFramesOfMeshHaveTheExactImageAsTheirMean) {
+  const MeshPlace mesh;
+  const auto stream = std::make_shared<GpuStream>(context_);
+  GpuRendererSettings settings;
+  settings.draw.exact = false;
+  GpuMeshSettings unjittered;
+  unjittered.jitters = false;
+  GpuSceneRenderer gpu(stream, makeGpuMeshDrawer(stream, unjittered), {mesh.frame, mesh.tree, mesh.source(), {}},
+                       settings);
+  for (int step = 0; step < 600; step += 200) {
+    SCOPED_TRACE(step);
+    const RenderedView expected = gpu.render(flightCamera(), flightPose(step), nullptr);
+    gpu.draw(flightCamera(), flightPose(step));
+    const double once = decibels(gpu.lastImage().colour, expected.colour);
+    EXPECT_TRUE(gpu.hasMore());
+    int frames = 1;
+    for (; gpu.hasMore(); ++frames) gpu.draw(flightCamera(), flightPose(step));
+    EXPECT_EQ(frames, 64);
+    const double mean = decibels(gpu.lastImage().colour, expected.colour);
+    // Independent frames would gain 18 dB, but what several layers decide together is not stratified.
+    EXPECT_GT(mean, once + 10);
+    while (frames < 512) {
+      gpu.draw(flightCamera(), flightPose(step));
+      ++frames;
+    }
+    EXPECT_GT(decibels(gpu.lastImage().colour, expected.colour), mean + 5);
+  }
 }
 
 TEST_F(GpuDrawing, ReadsContentsInTheBackgroundUntilTheImageEqualsTheBlockingOne) {

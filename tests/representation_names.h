@@ -21,7 +21,7 @@ inline constexpr std::string_view kOrdinaryNames[] = {"field", "mesh"};
 inline const std::vector<std::string_view>& distinctNames() {
 #define TESSERA_NAME(name, Name) #name,
   static const std::vector<std::string_view> names = [] {
-    std::vector<std::string_view> all = {TESSERA_REPRESENTATIONS(TESSERA_NAME, TESSERA_NAME, TESSERA_NAME)};
+    std::vector<std::string_view> all = {TESSERA_REPRESENTATIONS(TESSERA_NAME, TESSERA_NAME)};
     for (const std::string_view ordinary : kOrdinaryNames) std::erase(all, ordinary);
     return all;
   }();

@@ -57,24 +57,15 @@ std::unique_ptr<ViewRenderer> withWarnings(const fs::path& folder, const Tileset
   return std::make_unique<WarningRenderer<Renderer>>(folder, tileset, budgetBytes, std::move(renderer));
 }
 
-// Whether the GPU of the device draws scenes of this representation; else the CPU does.
-bool isDrawnOnGpu([[maybe_unused]] const Device& device, [[maybe_unused]] std::string_view representation) {
-#ifdef TESSERA_HAS_VULKAN
-  return vulkanContext(device) && hasGpuDrawer(representation);
-#else
-  return false;
-#endif
-}
-
 std::unique_ptr<ViewRenderer> makeSceneRenderer([[maybe_unused]] const Device& device, const fs::path& folder,
                                                 const Tileset& tileset, SceneRendererSettings settings) {
 #ifdef TESSERA_HAS_VULKAN
-  if (isDrawnOnGpu(device, tileset.representation)) {
+  if (const auto context = vulkanContext(device)) {
     GpuRendererSettings ofGpu;
     ofGpu.draw = settings.draw;
     ofGpu.selection = settings.selection;
     ofGpu.budgetBytes = settings.budgetBytes;
-    return withWarnings(folder, tileset, settings.budgetBytes, openGpuScene(vulkanContext(device), folder, ofGpu));
+    return withWarnings(folder, tileset, settings.budgetBytes, openGpuScene(context, folder, ofGpu));
   }
 #endif
   TileScene scene = openTileScene(folder, requireCodec(folder, tileset));
@@ -98,8 +89,8 @@ class SceneRenderSource final : public RenderSource {
     settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
     settings.selection.finestLevel = options.level;
     settings.threads = options.threads;
-    settings.budgetBytes = options.memoryMiB > 0 ? static_cast<uint64_t>(options.memoryMiB * 1048576)
-                                                 : sceneBudgetBytes(device, tileset_.representation);
+    settings.budgetBytes =
+        options.memoryMiB > 0 ? static_cast<uint64_t>(options.memoryMiB * 1048576) : sceneBudgetBytes(device);
     renderer_ = makeSceneRenderer(device, folder, tileset_, settings);
   }
 
@@ -124,8 +115,8 @@ class SceneRenderSource final : public RenderSource {
 
 }  // namespace
 
-uint64_t sceneBudgetBytes(const Device& device, std::string_view representation) {
-  const uint64_t own = isDrawnOnGpu(device, representation) ? device.ownMemory().bytes : 0;
+uint64_t sceneBudgetBytes(const Device& device) {
+  const uint64_t own = device.ownMemory().bytes;
   return (own > 0 ? own : static_cast<uint64_t>(usableMemoryBytes())) / 2;
 }
 

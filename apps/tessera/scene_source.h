@@ -6,8 +6,8 @@
 namespace tessera {
 
 // Returns the default budget for a scene's contents: half of the memory in which they lie, the GPU's own or the
-// machine's: the latter if the CPU draws scenes of this representation.
-uint64_t sceneBudgetBytes(const Device& device, std::string_view representation);
+// machine's.
+uint64_t sceneBudgetBytes(const Device& device);
 
 // Throws Error if the folder holds no scene, if the scene has no such level, or if its coarsest level does not fit into
 // memory. Warns if an image was rendered coarser than requested because memory was short.

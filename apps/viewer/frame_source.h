@@ -37,7 +37,7 @@ inline std::optional<Vec3d> unprojectPixel(const Camera& camera, const Pose& wor
 // The image that a window shows.
 struct ShownPicture {
   GpuRenderedView onGpu;  // colour 0: there is no image yet
-  // Whether the image shows the whole view that was requested, at the window's full resolution.
+  // Whether the image shows the whole view that was requested, at the window's full resolution, as well as it can.
   bool isComplete = false;
   bool isNew = false;  // since the last update
 };

@@ -19,7 +19,7 @@ ShownPicture GpuFrameSource::update(const Camera& window, const Pose& worldFromC
   if (begun_ && moving) resolution_.took(std::chrono::duration<double, std::milli>(now - *begun_).count());
   begun_ = moving ? std::optional(now) : std::nullopt;
   shown_.onGpu = renderer_->draw(camera, worldFromCamera);
-  shown_.isComplete = !moving && renderer_->state().missing == 0;
+  shown_.isComplete = !moving && renderer_->state().missing == 0 && !renderer_->hasMore();
   camera_ = camera;
   pose_ = worldFromCamera;
   return shown_;

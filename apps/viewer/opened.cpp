@@ -119,11 +119,12 @@ std::unique_ptr<FrameSource> openPictures(const ViewOptions& options, const std:
   const std::string& kind = options.device.kind;
   const bool isMeant =
       parseVulkanDevice(kind) && (!window->isCpu() || kind.starts_with("vulkan:") || !parseVulkanDevice("auto"));
-  if (isScene(options.folder) && isMeant && hasGpuDrawer(readTileset(options.folder).representation)) {
+  if (isScene(options.folder) && isMeant) {
     GpuRendererSettings settings;
     settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
     settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);
     settings.inBackground = true;
+    settings.draw.exact = false;
     return std::make_unique<GpuFrameSource>(openGpuScene(window, options.folder, settings));
   }
   RenderSourceOptions renderSource;

@@ -84,12 +84,13 @@ TEST_F(ViewerTest, ShowsWhatAnotherDeviceDraws) {
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }
 
-// Vulkan draws no scenes of `mesh`: the window shows the images of the CPU on either device.
 TEST_F(ViewerTest, ShowsMeshScenesAsTheCpuDrawsThem) {
   const ImageF oracle = requested("mesh");
   const auto [least, most] = std::minmax_element(oracle.pixels.begin(), oracle.pixels.end());
   EXPECT_GT(*most - *least, 0.3f) << "the view shows something";
-  for (const char* device : {"cpu", "vulkan"}) EXPECT_GT(psnr(toFloat(shown("mesh", device)), oracle), 50) << device;
+  EXPECT_GT(psnr(toFloat(shown("mesh", "cpu")), oracle), 50);
+  // The mean of 64 frames, in which many layers of this scene are half transparent.
+  EXPECT_GT(psnr(toFloat(shown("mesh", "vulkan")), oracle), 34);
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }
 

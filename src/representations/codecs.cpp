@@ -9,13 +9,13 @@ namespace tessera {
 
 #define SKIP(name, Name)
 #define CODEC(name, Name) const ContentCodec& name##Codec();
-TESSERA_REPRESENTATIONS(SKIP, CODEC, CODEC)
+TESSERA_REPRESENTATIONS(SKIP, CODEC)
 #undef CODEC
 
 const ContentCodec* findCodec(std::string_view representation) {
 #define CODEC(name, Name) \
   if (representation == #name) return &name##Codec();
-  TESSERA_REPRESENTATIONS(SKIP, CODEC, CODEC)
+  TESSERA_REPRESENTATIONS(SKIP, CODEC)
 #undef CODEC
   return nullptr;
 }

@@ -1,7 +1,6 @@
 #include "representations/gpu_drawers.h"
 
 #include "base/check.h"
-#include "base/error.h"
 #include "representations/codecs.h"
 #include "representations/list.h"
 #include "tiles/scene_folder.h"
@@ -10,22 +9,14 @@ namespace tessera {
 
 #define SKIP(name, Name)
 #define DRAWER(name, Name) std::unique_ptr<GpuDrawer> makeGpu##Name##Drawer(const std::shared_ptr<GpuStream>& stream);
-TESSERA_REPRESENTATIONS(SKIP, SKIP, DRAWER)
+TESSERA_REPRESENTATIONS(SKIP, DRAWER)
 #undef DRAWER
-
-bool hasGpuDrawer(std::string_view representation) {
-#define DRAWER(name, Name) \
-  if (representation == #name) return true;
-  TESSERA_REPRESENTATIONS(SKIP, SKIP, DRAWER)
-#undef DRAWER
-  return false;
-}
 
 std::unique_ptr<GpuDrawer> makeGpuDrawer(std::string_view representation, const std::shared_ptr<GpuStream>& stream) {
   std::unique_ptr<GpuDrawer> drawer;
 #define DRAWER(name, Name) \
   if (representation == #name) drawer = makeGpu##Name##Drawer(stream);
-  TESSERA_REPRESENTATIONS(SKIP, SKIP, DRAWER)
+  TESSERA_REPRESENTATIONS(SKIP, DRAWER)
 #undef DRAWER
   CHECK(drawer != nullptr);
   return drawer;
@@ -35,10 +26,6 @@ std::unique_ptr<GpuSceneRenderer> openGpuScene(const std::shared_ptr<const GpuCo
                                                const GpuRendererSettings& settings) {
   const Tileset tileset = readTileset(folder);
   const ContentCodec& codec = requireCodec(folder, tileset);
-  if (!hasGpuDrawer(tileset.representation)) {
-    throw Error(folder.string(), "", "is a scene of " + tileset.representation + ", which no GPU draws yet",
-                "use --device cpu");
-  }
   const auto stream = std::make_shared<GpuStream>(context);
   return std::make_unique<GpuSceneRenderer>(stream, makeGpuDrawer(tileset.representation, stream),
                                             openTileScene(folder, codec), settings);

@@ -11,12 +11,12 @@
 namespace tessera {
 
 #define METHOD(name, Name) const Method& name##Method();
-TESSERA_REPRESENTATIONS(METHOD, METHOD, METHOD)
+TESSERA_REPRESENTATIONS(METHOD, METHOD)
 #undef METHOD
 
 std::span<const Method* const> methods() {
 #define METHOD(name, Name) &name##Method(),
-  static const Method* const kMethods[] = {TESSERA_REPRESENTATIONS(METHOD, METHOD, METHOD)};
+  static const Method* const kMethods[] = {TESSERA_REPRESENTATIONS(METHOD, METHOD)};
 #undef METHOD
   return kMethods;
 }

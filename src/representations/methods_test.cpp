@@ -22,8 +22,8 @@ namespace {
 
 #define NAME(name, Name) #name,
 #define SKIP(name, Name)
-const std::vector<std::string> kNames = {TESSERA_REPRESENTATIONS(NAME, NAME, NAME)};
-const std::vector<std::string> kNamesOfScenes = {TESSERA_REPRESENTATIONS(SKIP, NAME, NAME)};
+const std::vector<std::string> kNames = {TESSERA_REPRESENTATIONS(NAME, NAME)};
+const std::vector<std::string> kNamesOfScenes = {TESSERA_REPRESENTATIONS(SKIP, NAME)};
 #undef SKIP
 #undef NAME
 

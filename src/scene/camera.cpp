@@ -67,6 +67,10 @@ std::string_view lensName(LensModel model) {
   return lensFacts(model).name;
 }
 
+bool isPinhole(LensModel model) {
+  return model == LensModel::pinhole || model == LensModel::simplePinhole;
+}
+
 bool lensSeesBehind(LensModel model) {
   return lensFacts(model).seesBehind;
 }

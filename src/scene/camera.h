@@ -17,6 +17,7 @@ int lensParameterCount(LensModel model);
 std::string_view lensName(LensModel model);  // COLMAP's name, "OPENCV_FISHEYE"
 std::optional<LensModel> lensFromName(std::string_view name);
 std::optional<LensModel> lensFromNumber(int number);  // COLMAP's number of the model
+bool isPinhole(LensModel model);                      // without distortion: lines stay lines
 bool lensSeesBehind(LensModel model);                 // whether it may see more than 90° off its axis
 
 struct Camera {

@@ -24,6 +24,7 @@ class GpuFrame {
   // Begins an image with `numbersOfPixel` accumulated values for each pixel (begin_view.comp).
   void begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel, const ViewRequest& request);
   const arguments::ViewArguments& view() const { return view_; }
+  const PixelDirections& directions() const { return pixels_; }
   // Runs a kernel with one invocation for each pixel.
   template <class Arguments>
   void run(const GpuKernel& kernel, const Arguments& arguments) {

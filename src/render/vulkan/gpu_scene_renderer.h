@@ -62,6 +62,7 @@ class GpuSceneRenderer final : public GpuViewRenderer {
   }
   SceneState state() const override;
 
+  RenderedView lastImage() { return frame_.drawn(); }  // also of draw(); waits for the GPU
   const TileCut& cut() const { return tiles_.cut(); }  // of the last image
   const TileChoice& choice() const { return tiles_.choice(); }
   const TileCache<GpuContent>& cache() const { return tiles_.cache(); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/check.h"
+#include "compute/cpu/device.h"
 #include "representations/mesh/content/patch_texels.h"
 
 namespace tessera {
@@ -81,6 +82,16 @@ void MapInference::infer(PatchSet& set, Bc4Effort effort) {
       }
       compressPatch(set, first + i, bytes.data(), effort);
     }
+  }
+}
+
+void inferMapsOnCpu(MeshContent& content, int threads) {
+  if (content.encoders.empty()) return;
+  const std::unique_ptr<Device> device = makeCpuDevice(threads);
+  for (uint32_t resource = 0; resource < content.encoders.size(); ++resource) {
+    MapInference inference(*device, content.encoders[resource]->encoder);
+    for (PatchSet& part : content.parts)
+      if (part.encoder && part.encoder->resource == resource) inference.infer(part);
   }
 }
 

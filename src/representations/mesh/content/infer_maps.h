@@ -32,4 +32,8 @@ class MapInference {
   Matrix<float> encoded_;
 };
 
+struct MeshContent;
+// Sets the textures of all parts of a content that have a PatchEncoder. `threads`: 0: as many as the machine has.
+void inferMapsOnCpu(MeshContent& content, int threads);
+
 }  // namespace tessera

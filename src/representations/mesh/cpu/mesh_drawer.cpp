@@ -5,7 +5,6 @@
 #include <mutex>
 
 #include "base/check.h"
-#include "compute/cpu/device.h"
 #include "render/pixel_directions.h"
 #include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/cpu/mesh_tracer.h"
@@ -82,13 +81,7 @@ class MeshDrawer final : public CpuDrawer {
     CHECK(decoded != nullptr);
     if (!decoded->value.encoders.empty()) {
       const std::lock_guard lock(inferring_);
-      const std::unique_ptr<Device> device = makeCpuDevice(threads);
-      MeshContent& mesh = decoded->value;
-      for (uint32_t resource = 0; resource < mesh.encoders.size(); ++resource) {
-        MapInference inference(*device, mesh.encoders[resource]->encoder);
-        for (PatchSet& part : mesh.parts)
-          if (part.encoder && part.encoder->resource == resource) inference.infer(part);
-      }
+      inferMapsOnCpu(decoded->value, threads);
     }
     return std::make_unique<PreparedMesh>(std::move(content));
   }

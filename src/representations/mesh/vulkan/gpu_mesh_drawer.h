@@ -1,0 +1,20 @@
+// Draws `mesh` contents on a GPU.
+#pragma once
+
+#include "render/vulkan/gpu_drawer.h"
+
+namespace tessera {
+
+struct GpuMeshSettings {
+  // How frames of a sequence are drawn, where the image need not be exact (DrawSettings::exact).
+  bool jitters = false;  // frames show different places within the pixels
+  bool blends = true;    // frames are blended with those before them
+  // The number of fragments for which exact images have memory; 0: an eighth of the GPU's memory. Images with more are
+  // drawn in several strips.
+  uint32_t listedFragments = 0;
+};
+
+std::unique_ptr<GpuDrawer> makeGpuMeshDrawer(const std::shared_ptr<GpuStream>& stream);
+std::unique_ptr<GpuDrawer> makeGpuMeshDrawer(const std::shared_ptr<GpuStream>& stream, const GpuMeshSettings& settings);
+
+}  // namespace tessera

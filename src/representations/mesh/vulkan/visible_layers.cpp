@@ -1,0 +1,69 @@
+#include "representations/mesh/vulkan/visible_layers.h"
+
+#include "shaders/dither_layers.h"
+#include "shaders/patch_triangles_places.h"
+
+namespace tessera {
+namespace {
+
+GraphicsPipelineOptions ditheringOptions() {
+  GraphicsPipelineOptions options;
+  options.colours = {{ImageFormat::rg32Uint}};
+  options.depth = ImageFormat::depth32Float;
+  options.depthCompare = VK_COMPARE_OP_GREATER;
+  options.fragmentStores = true;
+  return options;
+}
+
+}  // namespace
+
+VisibleLayers::~VisibleLayers() {
+  for (auto* pass : {&background_, &tiles_, &more_})
+    if (*pass) stream_->deferDestroy(std::move(*pass));
+  if (image_) stream_->deferDestroy(std::move(image_));
+  for (GpuBuffer* buffer : {&visible_, &nearest_, &view_})
+    if (*buffer) stream_->deferDestroy(std::move(*buffer));
+}
+
+void VisibleLayers::ensureRaster(ImageSize size) {
+  const std::shared_ptr<const GpuContext>& context = stream_->context();
+  if (!pipeline_) {
+    pipeline_ = std::make_unique<GpuGraphicsPipeline>(context, kPatchTrianglesPlacesSpirv, kDitherLayersSpirv,
+                                                      ditheringOptions());
+    view_ = stream_->makeBuffer(sizeof(arguments::MeshViewArguments));
+  }
+  if (image_ && image_->size() == size) return;
+  for (auto* pass : {&background_, &tiles_, &more_})
+    if (*pass) stream_->deferDestroy(std::move(*pass));
+  if (image_) stream_->deferDestroy(std::move(image_));
+  image_ = stream_->makeImage(size, ImageFormat::rg32Uint);
+  const std::shared_ptr<GpuImage> depth = stream_->makeImage(size, ImageFormat::depth32Float);
+  const auto makePass = [&](LoadOperation colours, LoadOperation depths) {
+    return std::make_shared<GpuRenderPass>(context, std::vector<ColourAttachment>{{.image = image_, .load = colours}},
+                                           DepthAttachment{.image = depth, .load = depths, .clearDepth = 0});
+  };
+  background_ = makePass(LoadOperation::clear, LoadOperation::clear);
+  tiles_ = makePass(LoadOperation::keep, LoadOperation::clear);
+  more_ = makePass(LoadOperation::keep, LoadOperation::keep);
+  if (visible_.bytes() < image_->copiedBytes()) {
+    if (visible_) stream_->deferDestroy(std::move(visible_));
+    visible_ = GpuBuffer();
+    visible_ = stream_->makeBuffer(image_->copiedBytes());
+    if (nearest_) stream_->deferDestroy(std::move(nearest_));
+    nearest_ = GpuBuffer();
+    nearest_ = stream_->makeBuffer(image_->copiedBytes() / 2);
+  }
+}
+
+void VisibleLayers::draw(arguments::MeshViewArguments& view, const PlacedParts& parts) {
+  ensureRaster({view.raster.width, view.raster.height});
+  view.visible = visible_.address();
+  view.nearest = nearest_.address();
+  stream_->fillZero(nearest_, 0, image_->copiedBytes() / 2);
+  stream_->upload(view_, 0, std::as_bytes(std::span(&view, 1)));
+  drawParts(*stream_, *pipeline_, view_.address(), parts.ofBackground(), *background_, *more_);
+  drawParts(*stream_, *pipeline_, view_.address(), parts.ofTiles(), *tiles_, *more_);
+  stream_->copy(*image_, visible_, 0);
+}
+
+}  // namespace tessera
