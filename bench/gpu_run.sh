@@ -148,7 +148,6 @@ cities() {
     try "$name" tessera bake "$work/$name" "$work/$name.scene" --capture "$city" --device "$(has_gpu && echo "$device" || echo cpu)"
     try "$name" tessera eval "$work/$name.scene" "$city" --device "$device" --json "$work/$name.json"
     number "${key}_psnr" "$(psnr "$work/$name.json")"
-    [ "$name" = mesh ] && continue  # its scenes are drawn on the CPU
     try "$name" tessera bench frames "$work/$name.scene" --views "$city" --device "$device" --size "$size" --json "$work/$name-frames.json"
     json "${key}_frames" "$work/$name-frames.json"
   done
