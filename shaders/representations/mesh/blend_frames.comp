@@ -20,17 +20,20 @@ bool previousPosition(BlendFramesArguments a, uint pixel, out vec2 position) {
   const vec3 here = depth > 0 ? direction * (depth / direction.z) : direction;
   vec3 there;
   for (uint row = 0; row < 3; ++row) {
-    there[row] = dot(vec3(a.previousFromCamera[3 * row], a.previousFromCamera[3 * row + 1], a.previousFromCamera[3 * row + 2]), here);
+    there[row] = dot(vec3(a.previousFromCamera[3 * row], a.previousFromCamera[3 * row + 1],
+                          a.previousFromCamera[3 * row + 2]), here);
     if (depth > 0) there[row] += a.shift[row];
   }
   position = vec2(a.focal[0], a.focal[1]) * there.xy / there.z + vec2(a.centre[0], a.centre[1]);
-  return there.z > 0 && all(greaterThanEqual(position, vec2(0))) && all(lessThanEqual(position, vec2(a.view.width, a.view.height)));
+  return there.z > 0 && all(greaterThanEqual(position, vec2(0))) &&
+         all(lessThanEqual(position, vec2(a.view.width, a.view.height)));
 }
 
 // Weights of four pixels in a row for a place between the middle ones (Catmull and Rom): mixing two of them would blur
 // the history more with each frame.
 vec4 cubicWeights(float t) {
-  return vec4(t * (t * (1 - 0.5 * t) - 0.5), 1 + t * t * (1.5 * t - 2.5), t * (0.5 + t * (2 - 1.5 * t)), t * t * (0.5 * t - 0.5));
+  return vec4(t * (t * (1 - 0.5 * t) - 0.5), 1 + t * t * (1.5 * t - 2.5), t * (0.5 + t * (2 - 1.5 * t)),
+              t * t * (0.5 * t - 0.5));
 }
 
 // Mixes the history at a position, in pixels; returns the number of frames of the nearest pixel.

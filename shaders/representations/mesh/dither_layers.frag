@@ -25,14 +25,15 @@ void main() {
   const PatchTriangle of = patchTriangle(placed.part.value.pairs, triangle);
   const float opacity = mixOpacity(placed.part, placeInPatch(placed.part, of.patchNumber, clamp(place, 0, 1)));
   const uvec2 pixel = uvec2(gl_FragCoord.xy);
+  const uint rasterPixel = pixel.y * view.value.raster.width + pixel.x;
   const uint layer = 2 * of.patchNumber + (of.isSecond ? 1 : 0) + 0x10001 * number;
   const float distance = length(fromEye);
   float near = view.value.view.near, far = kSceneEnd;
   if (placed.isBackground != 0) near = behindBox(view.value.view, fromEye / distance);
-  if (view.value.isSamePixels != 0) far = farthestDistance(view.value.view, pixel.y * view.value.raster.width + pixel.x);
+  if (view.value.isSamePixels != 0) far = farthestDistance(view.value.view, rasterPixel);
   if (!(opacity > 0 && distance > near && distance < far && isInCells(placed, fromEye))) discard;
   // Stores take place even if the fragment is hidden.
-  if (opacity < 1) atomicMax(view.value.nearest.values[pixel.y * view.value.raster.width + pixel.x], floatBitsToUint(1 / distance));
+  if (opacity < 1) atomicMax(view.value.nearest.values[rasterPixel], floatBitsToUint(1 / distance));
   if (opacity <= ditherThreshold(pixel, view.value.frame, layer)) discard;
   visible = uvec2(number + 1, triangle);
 }

@@ -30,9 +30,11 @@ void main() {
   RasterArguments raster = view.value.raster;
   vec3 x;
   for (uint row = 0; row < 3; ++row) {
-    x[row] = dot(vec3(raster.rasterFromScene[3 * row], raster.rasterFromScene[3 * row + 1], raster.rasterFromScene[3 * row + 2]), fromEye);
+    x[row] = dot(vec3(raster.rasterFromScene[3 * row], raster.rasterFromScene[3 * row + 1],
+                      raster.rasterFromScene[3 * row + 2]), fromEye);
   }
   // Depths are 1 at the near plane and 0 at infinity.
   const vec2 size = vec2(raster.width, raster.height), centre = vec2(raster.centre[0], raster.centre[1]);
-  gl_Position = vec4((2 * vec2(raster.focal[0], raster.focal[1]) * x.xy + (2 * centre - size) * x.z) / size, raster.near, x.z);
+  const vec2 focal = vec2(raster.focal[0], raster.focal[1]);
+  gl_Position = vec4((2 * focal * x.xy + (2 * centre - size) * x.z) / size, raster.near, x.z);
 }

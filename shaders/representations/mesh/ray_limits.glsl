@@ -19,5 +19,6 @@ float behindBox(ViewArguments view, vec3 direction) {
 
 // Whether a place, relative to the eye, is in the cells in which a part is drawn.
 bool isInCells(PlacedPartArguments placed, vec3 fromEye) {
-  return fromEye.x >= placed.low[0] && fromEye.y >= placed.low[1] && fromEye.x < placed.high[0] && fromEye.y < placed.high[1];
+  return fromEye.x >= placed.low[0] && fromEye.y >= placed.low[1] && fromEye.x < placed.high[0] &&
+         fromEye.y < placed.high[1];
 }

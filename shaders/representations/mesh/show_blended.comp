@@ -13,9 +13,11 @@ void main() {
   BlendFramesArguments a = arguments.values;
   uint pixel;
   if (!pixelIndex(a.view, pixel)) return;
-  storePoint(a.view.colour, pixel, vec3(a.blended.values[5 * pixel], a.blended.values[5 * pixel + 1], a.blended.values[5 * pixel + 2]));
+  const uint first = 5 * pixel;
+  storePoint(a.view.colour, pixel,
+             vec3(a.blended.values[first], a.blended.values[first + 1], a.blended.values[first + 2]));
   // The depth is that of the frame, premultiplied by the blended opacity.
-  const float opacity = a.blended.values[5 * pixel + 3];
+  const float opacity = a.blended.values[first + 3];
   a.view.depth.values[pixel] *= opacity;
   a.view.opacity.values[pixel] = opacity;
 }
