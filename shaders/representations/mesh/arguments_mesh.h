@@ -122,8 +122,8 @@ struct BlendFramesArguments {
   float shift[3];               // of the eye, in the axes of the previous camera, world units
   float focal[2];               // of the previous camera, a pinhole, in pixels
   float centre[2];
-  uint isSame;           // whether the previous view was the same: the frames are averaged
-  float smallestWeight;  // of the frame if not
+  uint restingFrames;    // how many frames of the same view the history counts as at most; 0: the view has changed
+  float smallestWeight;  // of the frame if it has
 };
 TESSERA_SIZE(BlendFramesArguments, 240);
 

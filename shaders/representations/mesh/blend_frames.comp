@@ -64,9 +64,10 @@ void main() {
   const bool isNoisy = !IS_SET(a.noise) || a.noise.values[pixel] > 0;
   if (IS_SET(a.history) && isNoisy) {
     vec2 position;
-    if (a.isSame != 0) {
+    if (a.restingFrames != 0) {
       for (uint c = 0; c < 4; ++c) history[c] = a.history.values[5 * pixel + c];
-      frames = a.history.values[5 * pixel + 4];
+      // What was blended while the camera moved counts as one frame.
+      frames = min(a.history.values[5 * pixel + 4], float(a.restingFrames));
     } else if (previousPosition(a, pixel, position)) {
       frames = min(mixHistory(a, position, history), 1 / a.smallestWeight - 1);
       vec4 low = frame, high = frame;

@@ -61,7 +61,7 @@ void FrameBlend::blend(GpuFrame& frame, const Camera& camera, const Pose& worldF
   blending.centre[0] = static_cast<float>(camera_.centreX());
   blending.centre[1] = static_cast<float>(camera_.centreY());
   blending.noise = noise;
-  blending.isSame = isSame ? 1 : 0;
+  blending.restingFrames = isSame ? atRest_ : 0;
   blending.smallestWeight = kSmallestWeight;
   frame.run(blend_, blending);
   frame.run(show_, blending);
