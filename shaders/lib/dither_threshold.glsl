@@ -14,12 +14,12 @@ uint scatterBits(uint x) {
 // Returns a threshold between 0 and 1, both excluded: a layer is drawn if its opacity is larger. `layer`: any number
 // that layers of the same pixel seldom have in common.
 float ditherThreshold(uvec2 pixel, uint frame, uint layer) {
-  const uint seed = scatterBits(pixel.x ^ scatterBits(pixel.y ^ scatterBits(layer ^ scatterBits(frame >> 6))));
+  uint seed = scatterBits(pixel.x ^ scatterBits(pixel.y ^ scatterBits(layer ^ scatterBits(frame >> 6))));
   // Of each node of a binary tree with 64 leaves, whether its halves are swapped.
-  const uint swaps[2] = uint[2](scatterBits(seed ^ 0x9e3779b9u), scatterBits(seed ^ 0x7f4a7c15u));
+  uint swaps[2] = uint[2](scatterBits(seed ^ 0x9e3779b9u), scatterBits(seed ^ 0x7f4a7c15u));
   uint node = 1u, place = 0u;  // the root; the place of the leaf from left to right
   for (uint i = 0u; i < 6u; ++i) {
-    const uint digit = frame >> i & 1u;
+    uint digit = frame >> i & 1u;
     place = place << 1 | digit ^ swaps[node >> 5] >> (node & 31u) & 1u;
     node = node << 1 | digit;
   }

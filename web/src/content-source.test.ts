@@ -81,7 +81,7 @@ function make(edge: number, tileResources: (tile: number) => number[], settings:
     },
     drawer,
   } as unknown as ContentPath;
-  const renderer = { getContext: () => ({ getParameter: () => 256 }) } as unknown as THREE.WebGLRenderer;
+  const renderer = { getContext: () => ({ getParameter: () => 256 }), extensions: { has: () => false } } as unknown as THREE.WebGLRenderer;
   const clock = { now: 0 };
   const streamer = new TileStreamer(
     new TileSelector(tree), new ContentSource(path, renderer, codec as ContentCodec), { ...kStreamSettings, ...settings }, () => clock.now);

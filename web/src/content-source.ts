@@ -3,6 +3,7 @@
 import type * as THREE from 'three';
 import type { DecodePool } from './decode-pool';
 import type { ContentPlace, DrawnContent, SceneDrawer } from './draw/scene-drawer';
+import { kBlockExtension } from './draw/sliced-textures';
 import { getCodec, type KnownRepresentation } from './representations/codecs';
 import type { ContentFile, SceneFiles } from './scene-files';
 import type { ResourceSource } from './stream/shared-resources';
@@ -44,6 +45,7 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
       edge3D: gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number,
       layers: gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number,
       uniformBytes: gl.getParameter(gl.MAX_UNIFORM_BLOCK_SIZE) as number,
+      blockTextures: renderer.extensions.has(kBlockExtension),
     };
     if (tileset.resources.length === 0) return;
     this.resources = {

@@ -64,13 +64,13 @@ function shownScenes(): TesseraScene[] {
   return headlessPage.beside ? [headlessPage.city!, headlessPage.beside].filter(({ visible }) => visible) : [headlessPage.city!];
 }
 
-// Updates until nothing that the visible scenes request is still to be loaded.
-async function untilIdle(step: () => void, end: number): Promise<void> {
+// Updates until the visible scenes are in a state.
+async function until(state: 'loaded' | 'idle', step: () => void, end: number): Promise<void> {
   do {
     if (performance.now() > end) throw new Error('the view does not come to rest');
     step();
     await new Promise((resolve) => setTimeout(resolve, 5));
-  } while (shownScenes().some(({ idle }) => !idle));
+  } while (shownScenes().some((scene) => !scene[state]));
 }
 
 const headlessPage = {
@@ -122,15 +122,16 @@ const headlessPage = {
     const camera = look(view);
     const end = performance.now() + maximum;
     do {
-      await untilIdle(() => shownScenes().forEach((scene) => scene.prefetch(camera, renderer)), end);
-      draw(this.city!, camera);
+      await until('loaded', () => shownScenes().forEach((scene) => scene.prefetch(camera, renderer)), end);
+      do draw(this.city!, camera);
+      while (shownScenes().some(({ loaded, idle }) => loaded && !idle));
     } while (shownScenes().some(({ idle }) => !idle));
   },
 
   // Draws what is resident at each step until everything that the view requests is loaded, as the viewer does.
   async drawUntilSettled(view: View | View[], maximum = 60000): Promise<void> {
     const camera = look(view);
-    await untilIdle(() => draw(this.city!, camera), performance.now() + maximum);
+    await until('idle', () => draw(this.city!, camera), performance.now() + maximum);
   },
 
   // Draws an image `frames` times and returns the seconds of each frame.

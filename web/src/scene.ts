@@ -75,6 +75,7 @@ export class TesseraScene extends THREE.Object3D {
   largestResolutionScale = 1; // GPU memory is reserved for this resolution, so that reaching it evicts no tiles
   display: DisplayMode = 'colour';
   featureLevel = 1; // the level that `featureLevel` display modes show: 0 for the coarse features, up to `featureLevels`
+  framesAtRest = 64; // how many frames are blended where nothing moves, in scenes whose frames are noisy
   minTransmittance = 1 / 255; // rays end below this transmittance; 0: never
   // Boxes in which nothing of the scene is drawn, at most kMaxHiddenBoxes. Each matrix maps the unit cube centred at
   // the origin to this object's frame.
@@ -153,8 +154,13 @@ export class TesseraScene extends THREE.Object3D {
   }
 
   // True when nothing that the last view requested is still to be loaded.
+  get loaded(): boolean {
+    return this.refused || (this.complete && (this.streamer?.idle ?? false));
+  }
+
+  // True when drawing the same view again would give the same image.
   get idle(): boolean {
-    return this.refused || (this.complete && (this.streamer?.idle ?? false) && this.drawer?.wantsAnotherFrame() === false);
+    return this.loaded && (this.refused || this.drawer?.wantsAnotherFrame() === false);
   }
 
   // The values that `display` can have, and those that `featureLevel` can have for modes that use it.
@@ -203,11 +209,13 @@ export class TesseraScene extends THREE.Object3D {
     // In scenes whose rays always end, rays that hit nothing take the background block's colour, or else the coarsest
     // content's. It is always resident, so the colour does not depend on the view.
     const backgroundContent = behind ?? streamer.findResident(coarsestTiles(this.tree)[0]);
-    mesh.visible = drawer.draw({ pictures, worldFromScene, contents, opaqueDepth: depth, backgroundContent }, {
+    const hasOpaqueDepthChanged = this.opaque.hasChanged || this.neighbours.behind.some(({ loaded }) => !loaded);
+    mesh.visible = drawer.draw({ pictures, worldFromScene, contents, opaqueDepth: depth, hasOpaqueDepthChanged, backgroundContent }, {
       minTransmittance: this.minTransmittance,
       visibility: Math.min(Math.max(this.visibility * diagonal, kNearby), kFarAway),
       display: this.display,
       featureLevel: this.featureLevel,
+      framesAtRest: this.framesAtRest,
       // Something else may be visible behind the scene even if it ends no rays.
       endsRays: this.showsBackgroundBlock && this.visibility === Infinity && this.neighbours.behind.length === 0,
       hidden: inScene(this.hidden),
@@ -217,7 +225,7 @@ export class TesseraScene extends THREE.Object3D {
     mesh.renderOrder = kFirstRenderOrder + this.neighbours.behind.length;
   }
 
-  // Streams what `update` would draw, without drawing: for callers that wait until the scene is `idle` and then need
+  // Streams what `update` would draw, without drawing: for callers that wait until the scene is `loaded` and then need
   // one complete image.
   prefetch(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
     const look = this.look(camera, renderer);

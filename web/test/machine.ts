@@ -8,6 +8,7 @@ const root = fileURLToPath(new URL('../../', import.meta.url));
 export const program = process.env.TESSERA ?? `${root}build/release/apps/tessera/tessera`;
 export const goldenScene = `${root}tests/golden/volume`;
 export const goldenHash = `${root}tests/golden/hash`;
+export const goldenMesh = `${root}tests/golden/mesh`;
 export const viewer = `${root}web/dist`;
 const chromiumPath = process.env.TESSERA_CHROMIUM ?? '/usr/bin/chromium';
 

@@ -149,6 +149,10 @@ export class Viewer {
   }
 
   // True when nothing that the last view requested is still to be loaded.
+  get loaded(): boolean {
+    return this.visibleScenes.every(({ loaded }) => loaded);
+  }
+
   get idle(): boolean {
     return this.visibleScenes.every(({ idle }) => idle);
   }

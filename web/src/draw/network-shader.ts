@@ -2,6 +2,15 @@
 // index vectors.
 import type { DenseLayer } from '../tiles/network';
 
+// The first 16 real spherical harmonics of the direction d as GLSL, in the order of tiny-cuda-nn.
+export const kHarmonics = [
+  '0.28209479', '-0.48860251 * d.y', '0.48860251 * d.z', '-0.48860251 * d.x', '1.09254843 * d.x * d.y', '-1.09254843 * d.y * d.z',
+  '0.94617470 * d.z * d.z - 0.31539157', '-1.09254843 * d.x * d.z', '0.54627422 * (d.x * d.x - d.y * d.y)',
+  '0.59004359 * d.y * (d.y * d.y - 3.0 * d.x * d.x)', '2.89061144 * d.x * d.y * d.z', '0.45704580 * d.y * (1.0 - 5.0 * d.z * d.z)',
+  '0.37317633 * d.z * (5.0 * d.z * d.z - 3.0)', '0.45704580 * d.x * (1.0 - 5.0 * d.z * d.z)',
+  '1.44530572 * d.z * (d.x * d.x - d.y * d.y)', '0.59004359 * d.x * (3.0 * d.y * d.y - d.x * d.x)',
+];
+
 // Writes a number as a GLSL float literal with full precision.
 function literal(x: number): string {
   const text = x.toPrecision(9);

@@ -3,8 +3,17 @@
 import * as THREE from 'three';
 import { drawAsTheyStand, type Picture } from './picture';
 
+// Returns a depth texture of one texel, so that programs need no variant for worlds without opaque objects.
+export function farthestDepth(): THREE.DataTexture {
+  const texture = new THREE.DataTexture(new Uint8Array([255]), 1, 1, THREE.RedFormat);
+  texture.needsUpdate = true;
+  return texture;
+}
+
 export class OpaqueDepth {
+  hasChanged = false; // whether anything in the world has moved, appeared or disappeared since the last call of `draw`
   private target?: THREE.WebGLRenderTarget;
+  private lastPlaces: number[] = [];
 
   get bytes(): number {
     // Colour and depth take 4 bytes each.
@@ -22,9 +31,11 @@ export class OpaqueDepth {
     const seeThrough = new Set<THREE.Material>();
     const layers = new THREE.Layers();
     layers.mask = pictures.reduce((mask, { camera }) => mask | camera.layers.mask, 0);
+    const seen: THREE.Object3D[] = [];
     let hasOpaque = false;
     const look = (object: THREE.Object3D) => {
       if (!object.visible) return; // children are invisible too
+      seen.push(object);
       const { material } = object as THREE.Mesh;
       if (material !== undefined && object.layers.test(layers)) {
         for (const one of Array.isArray(material) ? material : [material]) {
@@ -38,6 +49,7 @@ export class OpaqueDepth {
     };
     look(world);
     if (!hasOpaque) {
+      this.hasChanged = this.target !== undefined;
       this.dispose();
       return null;
     }
@@ -65,6 +77,10 @@ export class OpaqueDepth {
     Object.assign(renderer.shadowMap, { autoUpdate, needsUpdate });
     if (background) (world as THREE.Scene).background = background;
     for (const material of seeThrough) material.visible = true;
+    // Joints of animated models are objects, too. Rendering has updated the matrices.
+    const places = seen.flatMap(({ id, matrixWorld: { elements } }) => [id, ...elements]);
+    this.hasChanged = places.length !== this.lastPlaces.length || places.some((x, i) => x !== this.lastPlaces[i]);
+    this.lastPlaces = places;
     return target.depthTexture;
   }
 

@@ -32,6 +32,7 @@ export interface DrawSettings {
   visibility: number; // visibility range beyond the scene's box, scene units, above 0
   display: string; // name of a ShownMode
   featureLevel: number; // the level that a feature-level mode shows
+  framesAtRest: number; // how many frames are blended where nothing moves, if the drawer blends frames
   endsRays: boolean; // rays that hit nothing are opaque, in scenes that declare so
   // Boxes in which nothing is drawn, and boxes in which nothing of the background block is drawn. Each matrix maps the
   // unit cube centred at the origin to the scene. Degenerate boxes hide nothing.
@@ -45,6 +46,7 @@ export interface SceneView<Drawn extends DrawnContent = DrawnContent> {
   worldFromScene: THREE.Matrix4; // the world of three.js
   contents: DrawnPart<Drawn>[][]; // for each picture, front to back
   opaqueDepth: THREE.Texture | null; // depth of the opaque objects, where rays end
+  hasOpaqueDepthChanged: boolean; // since the last frame, although the cameras may not have moved
   backgroundContent?: Drawn; // the content that rays which hit nothing belong to; independent of the view
 }
 

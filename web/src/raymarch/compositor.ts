@@ -2,16 +2,18 @@
 // (docs/tile-format.md, section 4).
 import * as THREE from 'three';
 import { colourOfBlock, colourOfLevel, type ShownMode } from '../draw/display-modes';
-import { kMaxHiddenBoxes } from '../draw/hidden-boxes';
-import { drawAsTheyStand, type Picture } from '../draw/picture';
+import { contentTarget } from '../draw/content-target';
+import { selectHiddenBoxes } from '../draw/hidden-boxes';
+import { farthestDepth } from '../draw/opaque-depth';
+import { drawIntoTargets } from '../draw/own-targets';
+import type { Picture } from '../draw/picture';
+import { readSurface } from '../draw/read-surface';
 import type { ContentPlace, DrawnPart, DrawnScene, DrawSettings, SceneDrawer, SceneView } from '../draw/scene-drawer';
 import { screenTriangle } from '../draw/screen-triangle';
-import { SceneError } from '../scene-error';
 import type { Box } from '../tiles/tileset';
 import { frontToBack as sortFrontToBack } from './box-order';
 import type { ContentPart, MarchedContent, MarchedHeader } from './content';
 import { contentMaterial, programKey, programMaterial, viewUniforms, type ProgramPlace, type ViewUniforms } from './content-program';
-import { contentTarget } from './content-target';
 import type { ContentTextures } from './content-textures';
 import type { MarchedOwn, Marching, MarchMethod } from './marching';
 
@@ -22,13 +24,6 @@ export interface MarchedDrawnContent<Own extends MarchedOwn = MarchedOwn> {
   backgroundBlock: boolean;
   mesh: THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
   own: Own;
-}
-
-// A depth texture of one texel, so that programs need no variant for worlds without opaque objects.
-function farthestDepth(): THREE.DataTexture {
-  const texture = new THREE.DataTexture(new Uint8Array([255]), 1, 1, THREE.RedFormat);
-  texture.needsUpdate = true;
-  return texture;
 }
 
 function bytesOfGeometry({ attributes, index }: THREE.BufferGeometry): number {
@@ -176,22 +171,14 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
       material.defines.CUTS = '';
       material.needsUpdate = true;
     }
-    const before = renderer.getRenderTarget();
-    const autoClear = renderer.autoClear;
-    const clearColour = renderer.getClearColor(new THREE.Color());
-    const clearAlpha = renderer.getClearAlpha();
-    renderer.setClearColor(0, 0);
-    renderer.autoClear = false;
-    for (const target of [this.target, ...(this.marching.lastPass ? [this.marching.lastPass.target] : [])]) {
-      renderer.setRenderTarget(target);
-      renderer.clear();
-    }
     const opaque = settings.endsRays && backgroundContent?.own.hasLearnedBackground ? backgroundContent.own : undefined;
-    drawAsTheyStand(renderer, pictures, () =>
-      pictures.forEach((picture, i) => this.drawOne(picture, worldFromScene, contents[i], opaque)));
-    renderer.autoClear = autoClear;
-    renderer.setClearColor(clearColour, clearAlpha);
-    renderer.setRenderTarget(before);
+    drawIntoTargets(renderer, pictures, () => {
+      for (const target of [this.target, ...(this.marching.lastPass ? [this.marching.lastPass.target] : [])]) {
+        renderer.setRenderTarget(target);
+        renderer.clear();
+      }
+      pictures.forEach((picture, i) => this.drawOne(picture, worldFromScene, contents[i], opaque));
+    });
     return backgroundContent?.own.hasLearnedBackground || contents.some((ofOne) => ofOne.length > 0);
   }
 
@@ -199,18 +186,8 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     return false;
   }
 
-  surfaceAt(renderer: THREE.WebGLRenderer, { part, origin, ray }: Picture, at: THREE.Vector2): THREE.Vector3 | undefined {
-    const pixel = (x: number, size: number) => Math.min(Math.max(Math.floor((0.5 + 0.5 * x) * size), 0), size - 1);
-    const { type } = this.target.textures[1];
-    const read = type === THREE.FloatType ? new Float32Array(4) : type === THREE.HalfFloatType ? new Uint16Array(4) : new Uint8Array(4);
-    renderer.readRenderTargetPixels(this.target, part.x + pixel(at.x, part.z), part.y + pixel(at.y, part.w), 1, 1, read, undefined, 1);
-    const [value, , , hides] = [...read].map(
-      (x) => (type === THREE.FloatType ? x : type === THREE.HalfFloatType ? THREE.DataUtils.fromHalfFloat(x) : x / 255));
-    if (hides <= 0.99) return undefined;
-    const distance = this.distancesOfBytes ? value / hides / Math.max(1 - value / hides, 1e-3) : value / hides;
-    const inPicture = new THREE.Vector3(at.x, at.y, 1);
-    const direction = inPicture.clone().applyMatrix3(ray).normalize();
-    return inPicture.applyMatrix3(origin).addScaledVector(direction, distance);
+  surfaceAt(renderer: THREE.WebGLRenderer, picture: Picture, at: THREE.Vector2): THREE.Vector3 | undefined {
+    return readSurface(renderer, this, picture, at);
   }
 
   dispose(): void {
@@ -235,14 +212,10 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
   }
 
   private hide(boxes: readonly THREE.Matrix4[], ofBackgroundBlock: readonly THREE.Matrix4[], withinBox: boolean): void {
-    if (boxes.length > kMaxHiddenBoxes) {
-      throw new SceneError('scene', 'hidden', `contains ${boxes.length} boxes; at most ${kMaxHiddenBoxes} are supported`, 'hide fewer, larger ones');
-    }
     const { boxFromScene, hiddenBoxes, hiddenBoxesOfBackgroundBlock } = this.view;
-    const whole = (box: THREE.Matrix4) => box.determinant() !== 0;
-    const all = [...boxes.filter(whole), ...ofBackgroundBlock.filter(whole).slice(0, kMaxHiddenBoxes)];
+    const { all, ofAllContents } = selectHiddenBoxes(boxes, ofBackgroundBlock);
     all.forEach((box, n) => boxFromScene.value[n].copy(box).invert());
-    hiddenBoxes.value = boxes.filter(whole).length;
+    hiddenBoxes.value = ofAllContents;
     hiddenBoxesOfBackgroundBlock.value = all.length;
     this.view.withinBox.value = withinBox;
     this.cuts ||= all.length > 0 || withinBox;

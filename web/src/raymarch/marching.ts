@@ -1,10 +1,10 @@
 // The interface of a representation to the compositor, for contents that are drawn by ray marching.
 import type * as THREE from 'three';
+import type { ContentTarget, TargetForm } from '../draw/content-target';
 import type { ShownMode } from '../draw/display-modes';
 import type { Picture } from '../draw/picture';
 import type { MarchedContent, MarchedHeader } from './content';
 import type { ProgramPieces, ViewUniforms } from './content-program';
-import type { ContentTarget, TargetForm } from './content-target';
 import type { ContentTextures } from './content-textures';
 
 // What a content on the GPU has besides its textures.

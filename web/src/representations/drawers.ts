@@ -3,9 +3,10 @@ import type { ShownMode } from '../draw/display-modes';
 import type { SceneDrawing } from '../draw/scene-drawer';
 import type { KnownRepresentation } from './codecs';
 import { hashDrawing } from './hash/hash-marching';
+import { meshDrawing } from './mesh/mesh-drawing';
 import { volumeDrawing } from './volume/volume-marching';
 
-const kDrawings = { volume: volumeDrawing, hash: hashDrawing } satisfies Record<KnownRepresentation, SceneDrawing>;
+const kDrawings = { volume: volumeDrawing, hash: hashDrawing, mesh: meshDrawing } satisfies Record<KnownRepresentation, SceneDrawing>;
 
 export type DisplayMode = (typeof kDrawings)[KnownRepresentation]['modes'][number]['name'];
 

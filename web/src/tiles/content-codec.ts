@@ -24,7 +24,7 @@ export type DeclaredContent = Pick<TileContent, 'backgroundBlock' | 'box'>;
 
 // How a representation modifies the rules for tilesets.
 export interface TilesetRules {
-  overlappingContents?: boolean; // the contents of a tile need no order and may overlap
+  overlappingContents?: boolean; // the contents of a tile need no order; those of tiles may overlap and cross walls of cells
 }
 
 // Codecs are stateless. Bytes are untrusted: methods that read them throw SceneError that names the file and the first

@@ -165,7 +165,7 @@ function ruleOfTile(tileset: Tileset, tile: Tile, rules: TilesetRules): Broken {
   const all = { i0: 0, j0: 0, i1: tileset.columns, j1: tileset.rows };
   if (!isRange(tile.cells) || !holdsCells(all, tile.cells)) return 'its cells are not within the grid';
   if (!isBox(tile.box)) return 'its box is empty or out of bounds';
-  if (!keepsToCells(tileset, tile)) return 'its box is not within its cells';
+  if (!rules.overlappingContents && !keepsToCells(tileset, tile)) return 'its box is not within its cells';
   if (!isError(tile.geometricError)) return 'its geometric error is not a length';
   return ruleOfContents(tileset, tile, rules);
 }

@@ -50,7 +50,7 @@ export function takePicture(
           await allTiles(viewer, signal, (pending) => tell({ piece, pieces: pieces.length, pending }));
           viewer.draw();
           signal.throwIfAborted();
-        } while (!viewer.idle); // drawing takes GPU memory itself, which may evict tiles
+        } while (!viewer.idle); // drawing takes GPU memory itself, which may evict tiles; frames of some scenes are blended
         context.drawImage(renderer.domElement, left, top);
       }
     } finally {
@@ -75,7 +75,7 @@ async function allTiles(viewer: Viewer, signal: AbortSignal, tell: (pending: num
     await new Promise((resolve) => setTimeout(resolve, 10));
     signal.throwIfAborted();
     if (viewer.renderer.getContext().isContextLost()) throw new Error('the WebGL context was lost; try again');
-    if (viewer.idle) return;
+    if (viewer.loaded) return;
     const now = performance.now();
     if (viewer.statistics?.loads !== loads) lastLoad = now;
     else if (now - lastLoad > kWait) throw new Error('no tiles arrive; try again later');

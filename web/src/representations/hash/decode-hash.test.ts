@@ -1,6 +1,6 @@
 import { beforeAll, describe, expect, it } from 'vitest';
 import { kStoredEdge, type TexelTextures } from '../../raymarch/content';
-import { decodeGolden, storedIn, Sum, testContentReader } from '../../testing/content-tests';
+import { decodeGolden, storedIn, Sum, testContentReader, testMarchedReader } from '../../testing/content-tests';
 import { goldenFile, goldenText, prepareDecoderInNode } from '../../testing/golden';
 import { kLengthOfRow, type HashContent } from './hash-content';
 import { paddedLength, layOutLists } from './hash-layout';
@@ -96,4 +96,5 @@ describe('decodeHash', () => {
   });
 
   testContentReader('hash', uris, uris.filter((uri) => uri.startsWith('tiles/L0')));
+  testMarchedReader('hash', uris);
 });

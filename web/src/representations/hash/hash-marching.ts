@@ -5,7 +5,7 @@ import type { Picture } from '../../draw/picture';
 import type { SceneDrawing } from '../../draw/scene-drawer';
 import { Compositor, type MarchedDrawnContent } from '../../raymarch/compositor';
 import type { ProgramPieces, ViewUniforms } from '../../raymarch/content-program';
-import type { ContentTarget, TargetForm } from '../../raymarch/content-target';
+import type { ContentTarget, TargetForm } from '../../draw/content-target';
 import type { ContentTextures } from '../../raymarch/content-textures';
 import type { MarchedOwn, Marching, MarchMethod } from '../../raymarch/marching';
 import type { HashHeader } from './decode-hash';

@@ -1,6 +1,7 @@
 // The textures of a `hash` content on the GPU.
 import * as THREE from 'three';
-import { atlasUniforms, ContentTextures, kForms } from '../../raymarch/content-textures';
+import { kForms } from '../../draw/sliced-textures';
+import { atlasUniforms, ContentTextures } from '../../raymarch/content-textures';
 import type { Vec3 } from '../../tiles/tileset';
 import { countColumns, kLengthOfRow, logitsOfLevel, vectorsOfPart, type ByteRange, type HashContent, type HashPart, type HashSettings, type List } from './hash-content';
 import { ratioFor } from './octant-distances';

@@ -3,21 +3,12 @@
 // which covers the picture and discards the pixels of other networks.
 import * as THREE from 'three';
 import { displayConstants } from '../../draw/display-modes';
-import { layersShader, writtenVector } from '../../draw/network-shader';
+import { kHarmonics, layersShader, writtenVector } from '../../draw/network-shader';
 import type { Picture } from '../../draw/picture';
 import type { ViewUniforms } from '../../raymarch/content-program';
 import { packNetwork, type DenseLayer } from '../../tiles/network';
 import { kHashModes } from './hash-modes';
 import { kWeightsOfTarget, countNetworks } from './hash-program';
-
-// The first 16 real spherical harmonics of d, in the order of tiny-cuda-nn.
-const kHarmonics = [
-  '0.28209479', '-0.48860251 * d.y', '0.48860251 * d.z', '-0.48860251 * d.x', '1.09254843 * d.x * d.y', '-1.09254843 * d.y * d.z',
-  '0.94617470 * d.z * d.z - 0.31539157', '-1.09254843 * d.x * d.z', '0.54627422 * (d.x * d.x - d.y * d.y)',
-  '0.59004359 * d.y * (d.y * d.y - 3.0 * d.x * d.x)', '2.89061144 * d.x * d.y * d.z', '0.45704580 * d.y * (1.0 - 5.0 * d.z * d.z)',
-  '0.37317633 * d.z * (5.0 * d.z * d.z - 3.0)', '0.45704580 * d.x * (1.0 - 5.0 * d.z * d.z)',
-  '1.44530572 * d.z * (d.x * d.x - d.y * d.y)', '0.59004359 * d.x * (3.0 * d.y * d.y - d.x * d.x)',
-];
 
 const kVertexShader = `
 in vec3 position;

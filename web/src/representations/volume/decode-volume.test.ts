@@ -1,6 +1,6 @@
 import { beforeAll, describe, expect, it } from 'vitest';
 import { kStoredEdge, type TexelTextures } from '../../raymarch/content';
-import { decodeGolden, storedIn, Sum, testContentReader } from '../../testing/content-tests';
+import { decodeGolden, storedIn, Sum, testContentReader, testMarchedReader } from '../../testing/content-tests';
 import { goldenFile, goldenText, prepareDecoderInNode } from '../../testing/golden';
 import { kDistanceCell, type VolumeContent } from './volume-content';
 
@@ -74,4 +74,5 @@ describe('decodeVolume', () => {
   });
 
   testContentReader('volume', uris);
+  testMarchedReader('volume', uris);
 });

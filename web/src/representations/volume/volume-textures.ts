@@ -1,6 +1,7 @@
 // The textures of a `volume` content on the GPU.
 import * as THREE from 'three';
-import { atlasUniforms, ContentTextures, kForms } from '../../raymarch/content-textures';
+import { kForms } from '../../draw/sliced-textures';
+import { atlasUniforms, ContentTextures } from '../../raymarch/content-textures';
 import { packNetwork } from '../../tiles/network';
 import type { Vec3 } from '../../tiles/tileset';
 import { kVectorsOfPart, type VolumeContent, type VolumePart } from './volume-content';

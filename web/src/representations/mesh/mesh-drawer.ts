@@ -1,0 +1,347 @@
+// Draws `mesh` contents (UE4-NeRF): triangles into images of what is visible, then one evaluation of a network per pixel.
+// Half-transparent triangles are dithered, and frames are blended. See web/README.md.
+import * as THREE from 'three';
+import { colourOfBlock, colourOfLevel } from '../../draw/display-modes';
+import { selectHiddenBoxes, kMaxHiddenBoxes } from '../../draw/hidden-boxes';
+import { farthestDepth } from '../../draw/opaque-depth';
+import { drawIntoTargets } from '../../draw/own-targets';
+import type { Picture } from '../../draw/picture';
+import { readSurface } from '../../draw/read-surface';
+import { kFarAway, type ContentPlace, type DrawnPart, type DrawnScene, type DrawSettings, type SceneDrawer, type SceneView } from '../../draw/scene-drawer';
+import { screenTriangle } from '../../draw/screen-triangle';
+import type { Box } from '../../tiles/tileset';
+import { bytesOfPart, type MeshHeader } from './decode-mesh';
+import { patchesAcross, type MeshContent, type MeshPart } from './mesh-content';
+import { kMeshModes } from './mesh-modes';
+import { MeshTargets } from './mesh-targets';
+import { MeshTextures } from './mesh-textures';
+import { PartNumbers } from './part-numbers';
+import { decodeShader, kBlendShader, kCopyShader, kSkyShader, passMaterial } from './passes';
+import { bytesOfIndices, patchGeometry } from './patch-geometry';
+import { distanceToBox, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
+import { rasterMaterial, type RasterKind } from './raster-program';
+
+const kWeightInMotion = 0.6; // of a frame; docs/benchmarks.md says why
+const kDepthSteps = 4; // between the depths of equal triangles
+const kCosineOfCut = 0.96; // a camera that turns by more than 16° between frames has jumped
+const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
+
+type Uniforms = Record<string, THREE.IUniform>;
+type TriangleMesh = THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
+
+interface DrawnMeshPart {
+  part: MeshPart;
+  row: number; // in the texture of numbers
+  geometry: THREE.BufferGeometry;
+  uniforms: Uniforms;
+  meshes: Partial<Record<RasterKind, TriangleMesh>>;
+}
+
+export interface DrawnMesh {
+  id: number;
+  box: Box;
+  isBackground: boolean;
+  isCompressed: boolean;
+  textures: MeshTextures;
+  parts: DrawnMeshPart[];
+}
+
+// What the last frame showed.
+interface LastFrame {
+  key: string;
+  isDrawn: boolean;
+  pictures: { clipFromScene: THREE.Matrix4; part: THREE.Vector4; forward: THREE.Vector3 }[];
+}
+
+export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMesh> {
+  readonly view = { resolution: { value: new THREE.Vector2(1, 1) }, opaqueDepth: { value: null as THREE.Texture | null }, display: { value: 0 } };
+  readonly featureLevels = 0;
+  pictures: Picture[] = [];
+  private readonly targets: MeshTargets;
+  private readonly numbers = new PartNumbers();
+  private readonly screen = screenTriangle();
+  private readonly nothingOpaque = farthestDepth();
+  private readonly anyCamera = new THREE.Camera();
+  private readonly triangles = new THREE.Scene();
+  private readonly pass = new THREE.Scene();
+  private readonly uniforms: Uniforms; // of triangles and passes
+  private readonly passes: Record<'sky' | 'blend' | 'copy', TriangleMesh>;
+  private readonly decoders: TriangleMesh[] = []; // of each shape of networks
+  private readonly prepared = new Map<string, TriangleMesh>(); // keeps programs alive
+  private lastId = 0;
+  private last?: LastFrame;
+  private framesAtRest = 0; // whose mean the history is; 0: the last frame showed another view
+  private wantedFrames = 1;
+  private framesInMotion = 0;
+
+  // Throws SceneError if the GPU cannot draw such a scene.
+  constructor(private readonly renderer: THREE.WebGLRenderer, private readonly scene: DrawnScene) {
+    this.targets = new MeshTargets(renderer);
+    const { output, solid, dithered, decoded, history } = this.targets;
+    const [featuresFirst, featuresSecond, visible] = dithered.textures;
+    this.uniforms = {
+      ...this.view,
+      part: { value: new THREE.Vector4() }, origin: { value: new THREE.Matrix3() }, ray: { value: new THREE.Matrix3() },
+      clipFromReference: { value: new THREE.Matrix4() }, depthRow: { value: new THREE.Vector4() }, wRow: { value: new THREE.Vector4() },
+      sceneNear: { value: scene.near }, visibility: { value: kFarAway },
+      sceneLow: { value: new THREE.Vector3() }, sceneHigh: { value: new THREE.Vector3() },
+      withinBox: { value: false }, frame: { value: 0 },
+      boxFromReference: { value: Array.from({ length: 2 * kMaxHiddenBoxes }, () => new THREE.Matrix4()) },
+      visible: { value: visible }, solid: { value: solid.texture }, featuresFirst: { value: featuresFirst },
+      featuresSecond: { value: featuresSecond }, decoded: { value: decoded.texture }, history: { value: history.texture },
+      from: { value: output.target.textures[0] }, sky: { value: null },
+      partNumbers: this.numbers.texture, vectorsOfPart: this.numbers.vectorsOfPart,
+      weight: { value: 1 }, hasHistory: { value: false }, isResting: { value: false },
+      previousClip: { value: new THREE.Matrix4() }, previousPart: { value: new THREE.Vector4() },
+    };
+    this.passes = {
+      sky: this.makePass(kSkyShader), blend: this.makePass(kBlendShader), copy: this.makePass(kCopyShader),
+    };
+    if (this.distancesOfBytes) this.passes.blend.material.defines.DISTANCES_OF_BYTES = '';
+    this.triangles.matrixWorldAutoUpdate = false;
+  }
+
+  get colour(): THREE.Texture {
+    return this.targets.output.target.textures[0];
+  }
+
+  get distance(): THREE.Texture {
+    return this.targets.output.target.textures[1];
+  }
+
+  get distancesOfBytes(): boolean {
+    return this.targets.output.distancesOfBytes;
+  }
+
+  get bytes(): number {
+    return this.targets.bytes + this.numbers.bytes + 4 * 9 + 1;
+  }
+
+  residentBytes({ parts, isCompressed, skyEdge }: MeshHeader): number {
+    return parts.reduce((sum, part) => sum + bytesOfPart(part, isCompressed) + bytesOfIndices(part), 24 * skyEdge * skyEdge);
+  }
+
+  prepare({ isCompressed }: MeshHeader): void {
+    for (const kind of ['dithered', 'solid'] as const) {
+      const key = `${kind} ${isCompressed}`;
+      if (this.prepared.has(key)) continue;
+      const mesh = new THREE.Mesh(this.screen, rasterMaterial(kind, isCompressed));
+      this.prepared.set(key, mesh);
+      this.renderer.compile(mesh, this.anyCamera);
+    }
+  }
+
+  allocate(content: MeshContent, { box, backgroundBlock, number, level }: ContentPlace): DrawnMesh {
+    const { isCompressed } = content;
+    const textures = new MeshTextures(content);
+    const parts = content.parts.map((part, n): DrawnMeshPart => {
+      const row = this.numbers.add(part, colourOfBlock(number), colourOfLevel(level));
+      const { features, opacity } = textures.parts[n];
+      const uniforms = {
+        ...this.uniforms,
+        featureTexels: { value: features }, opacityTexels: { value: opacity },
+        patchLayout: { value: new THREE.Vector3(part.patchEdge, patchesAcross(part), row + 1) },
+        // The same each time that the content is loaded, so that images are, too.
+        layers: { value: 0x10001 * (number + 1) + 0x1000193 * n },
+        partOrigin: { value: new THREE.Vector3() }, partStep: { value: part.step },
+        withinLow: { value: new THREE.Vector3() }, withinHigh: { value: new THREE.Vector3() },
+        isBackground: { value: backgroundBlock }, hiddenBoxes: { value: 0 },
+      };
+      return { part, row, geometry: patchGeometry(part, content.texels[n].vertices), uniforms, meshes: {} };
+    });
+    this.numbers.shapes.slice(this.decoders.length).forEach((network) => {
+      this.decoders.push(this.makePass(decodeShader(this.decoders.length, network)));
+    });
+    return { id: ++this.lastId, box, isBackground: backgroundBlock, isCompressed, textures, parts };
+  }
+
+  upload(content: DrawnMesh): 'more' | 'wait' | 'done' {
+    if (!content.textures.upload(this.renderer)) return 'more';
+    const isReady = ({ material }: TriangleMesh) => {
+      const { currentProgram } = this.renderer.properties.get(material) as { currentProgram?: { isReady(): boolean } };
+      return currentProgram?.isReady() ?? true;
+    };
+    return [...this.prepared.values(), ...this.decoders].every(isReady) ? 'done' : 'wait';
+  }
+
+  free({ textures, parts }: DrawnMesh): void {
+    textures.dispose();
+    for (const { row, geometry, meshes } of parts) {
+      this.numbers.remove(row);
+      geometry.dispose();
+      for (const mesh of Object.values(meshes)) mesh.material.dispose();
+    }
+  }
+
+  resize({ x, y }: THREE.Vector2): void {
+    if (this.targets.resize(x, y)) this.last = undefined;
+    this.view.resolution.value.set(x, y);
+  }
+
+  draw({ pictures, contents, opaqueDepth, hasOpaqueDepthChanged }: SceneView<DrawnMesh>, settings: DrawSettings): boolean {
+    const key = JSON.stringify([
+      pictures.map(({ clipFromScene, part }) => [clipFromScene.elements, part]),
+      contents.map((parts) => parts.map(({ content: { id }, within }) => [id, within])), settings, opaqueDepth !== null,
+    ]);
+    const isResting = this.last?.key === key && !hasOpaqueDepthChanged;
+    if (isResting && this.framesAtRest >= settings.framesAtRest) return this.last!.isDrawn;
+    this.pictures = pictures;
+    this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
+    this.view.display.value = kMeshModes.findIndex(({ name }) => name === settings.display);
+    this.uniforms.visibility.value = settings.visibility;
+    this.uniforms.withinBox.value = settings.withinBox;
+    // The frames at rest are a sequence of their own, so that images depend on the view alone.
+    this.wantedFrames = settings.framesAtRest;
+    this.framesAtRest = isResting ? this.framesAtRest + 1 : 0;
+    this.uniforms.frame.value = isResting ? this.framesAtRest - 1 : this.framesInMotion++;
+    this.uniforms.isResting.value = isResting;
+    this.uniforms.weight.value = isResting ? 1 / this.framesAtRest : kWeightInMotion;
+    drawIntoTargets(this.renderer, pictures, () => {
+      pictures.forEach((picture, i) => this.drawOne(picture, contents[i], settings, i, isResting));
+      this.run(this.passes.copy, this.targets.history, pictures);
+    });
+    const isDrawn = contents.some((ofOne) => ofOne.length > 0);
+    this.last = {
+      key, isDrawn,
+      pictures: pictures.map((picture) => ({ clipFromScene: picture.clipFromScene, part: picture.part, forward: viewDirection(picture) })),
+    };
+    return isDrawn;
+  }
+
+  wantsAnotherFrame(): boolean {
+    return this.framesAtRest < this.wantedFrames;
+  }
+
+  surfaceAt(renderer: THREE.WebGLRenderer, picture: Picture, at: THREE.Vector2): THREE.Vector3 | undefined {
+    return readSurface(renderer, { target: this.targets.output.target, distancesOfBytes: this.distancesOfBytes }, picture, at);
+  }
+
+  dispose(): void {
+    this.targets.dispose();
+    this.numbers.dispose();
+    this.screen.dispose();
+    this.nothingOpaque.dispose();
+    for (const { material } of [...Object.values(this.passes), ...this.decoders, ...this.prepared.values()]) material.dispose();
+  }
+
+  private makePass(shader: string): TriangleMesh {
+    const mesh = new THREE.Mesh(this.screen, passMaterial(shader, this.uniforms));
+    mesh.frustumCulled = false;
+    return mesh;
+  }
+
+  private run(pass: TriangleMesh, target: THREE.WebGLRenderTarget, pictures: Picture[]): void {
+    this.pass.children = [pass];
+    for (const { camera, part } of pictures) {
+      target.viewport.copy(part);
+      this.uniforms.part.value = part;
+      this.renderer.setRenderTarget(target);
+      this.renderer.render(this.pass, camera);
+    }
+    this.pass.children = [];
+  }
+
+  private drawOne(picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], settings: DrawSettings, number: number, isResting: boolean): void {
+    const { solid, dithered, decoded, output } = this.targets;
+    const point = this.place(picture, frontToBack, settings);
+    const isLayers = settings.display === 'layers';
+    this.drawTriangles(picture, frontToBack, 'solid', solid, point);
+    if (!isLayers) this.drawTriangles(picture, frontToBack, 'dithered', dithered, point);
+    decoded.viewport.copy(picture.part);
+    this.renderer.setRenderTarget(decoded);
+    if (number === 0) this.renderer.clear();
+    if (isLayers) {
+      for (const isBackground of [true, false]) this.renderTriangles(picture, frontToBack, 'layers', isBackground, point);
+    } else {
+      const sky = frontToBack.map(({ content }) => content.textures.sky).find((one) => one !== undefined);
+      if (sky && settings.visibility >= kFarAway && settings.display !== 'triangles' && settings.display !== 'alpha') {
+        this.uniforms.sky.value = sky;
+        this.run(this.passes.sky, decoded, [picture]);
+      }
+      for (const decoder of this.decoders) this.run(decoder, decoded, [picture]);
+    }
+    const before = this.last?.pictures[number];
+    const hasHistory = before !== undefined && before.forward.dot(viewDirection(picture)) > kCosineOfCut;
+    this.uniforms.hasHistory.value = hasHistory && (isResting || !isLayers);
+    if (before) {
+      this.uniforms.previousClip.value = relativeTo(point, before.clipFromScene);
+      this.uniforms.previousPart.value = before.part;
+    }
+    this.run(this.passes.blend, output.target, [picture]);
+  }
+
+  // Sets the uniforms of a picture, and returns its reference point.
+  private place(picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], { hidden, hiddenOfBackgroundBlock }: DrawSettings): THREE.Vector3 {
+    const { uniforms, scene: { box, near } } = this;
+    const point = referencePoint(picture);
+    const clip = relativeTo(point, picture.clipFromScene);
+    const nearest = Math.min(kFarAway, ...frontToBack.map(({ content }) => distanceToBox(content.box, picture.eye)));
+    uniforms.part.value = picture.part;
+    uniforms.origin.value = relativeOrigin(point, picture.origin);
+    uniforms.ray.value = picture.ray;
+    uniforms.clipFromReference.value = rasterProjection(picture, clip, Math.max(near, nearest));
+    uniforms.depthRow.value = matrixRow(clip, 2);
+    uniforms.wRow.value = matrixRow(clip, 3);
+    uniforms.sceneLow.value.set(...box.low).sub(point);
+    uniforms.sceneHigh.value.set(...box.high).sub(point);
+    const { all, ofAllContents } = selectHiddenBoxes(hidden, hiddenOfBackgroundBlock);
+    all.forEach((one, n) => (uniforms.boxFromReference.value[n] = relativeTo(point, one.clone().invert())));
+    for (const { content: { parts, isBackground } } of frontToBack) {
+      for (const part of parts) part.uniforms.hiddenBoxes.value = isBackground ? all.length : ofAllContents;
+    }
+    return point;
+  }
+
+  // Draws the background block, and the other contents in front of it.
+  private drawTriangles(
+    picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, target: THREE.WebGLRenderTarget, point: THREE.Vector3,
+  ): void {
+    target.viewport.copy(picture.part);
+    if (picture === this.pictures[0]) this.targets.clear(this.renderer, target);
+    this.renderer.setRenderTarget(target);
+    this.renderer.clear(false, true, false);
+    this.renderTriangles(picture, frontToBack, kind, true, point);
+    this.renderer.clear(false, true, false);
+    this.renderTriangles(picture, frontToBack, kind, false, point);
+  }
+
+  private renderTriangles(
+    { camera }: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, isBackground: boolean, point: THREE.Vector3,
+  ): void {
+    const meshes: TriangleMesh[] = [];
+    for (const { content, within = kEverywhere } of frontToBack) {
+      if (content.isBackground !== isBackground) continue;
+      for (const [order, { part, geometry, uniforms, meshes: ofPart }] of content.parts.entries()) {
+        if (part.patches === 0) continue;
+        uniforms.partOrigin.value.set(...part.origin).sub(point);
+        uniforms.withinLow.value.set(...within.low).sub(point);
+        uniforms.withinHigh.value.set(...within.high).sub(point);
+        const mesh = (ofPart[kind] ??= this.makeTriangles(kind, geometry, uniforms, content.isCompressed, order));
+        mesh.renderOrder = meshes.length;
+        meshes.push(mesh);
+      }
+    }
+    if (meshes.length === 0) return;
+    this.triangles.children = meshes;
+    this.renderer.render(this.triangles, camera);
+    this.triangles.children = [];
+  }
+
+  private makeTriangles(
+    kind: RasterKind, geometry: THREE.BufferGeometry, uniforms: Uniforms, isCompressed: boolean, order: number,
+  ): TriangleMesh {
+    const material = rasterMaterial(kind, isCompressed);
+    material.uniforms = uniforms;
+    // Of equal triangles, that of the first part is in front, as depths differ by rounding.
+    material.polygonOffset = order > 0;
+    material.polygonOffsetUnits = kDepthSteps * order;
+    const mesh = new THREE.Mesh(geometry, material);
+    mesh.frustumCulled = false;
+    mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;
+    return mesh;
+  }
+}
+
+function viewDirection({ ray }: Picture): THREE.Vector3 {
+  return new THREE.Vector3(0, 0, 1).applyMatrix3(ray).normalize();
+}

@@ -1,0 +1,61 @@
+// The images of a `mesh` scene on their way to the screen.
+import * as THREE from 'three';
+import { contentTarget, type ContentTarget } from '../../draw/content-target';
+
+// How the targets are named: `visible` holds numbers of parts with bits of distances, after two images of features.
+export class MeshTargets {
+  readonly output: ContentTarget; // colours and distances, for the page
+  readonly solid: THREE.WebGLRenderTarget;
+  readonly dithered: THREE.WebGLRenderTarget;
+  readonly decoded: THREE.WebGLRenderTarget;
+  readonly history: THREE.WebGLRenderTarget;
+
+  constructor(renderer: THREE.WebGLRenderer) {
+    this.output = contentTarget(renderer, { representation: 'mesh', pictures: 2, morePictures: 0, holdsSums: false });
+    const { depthTexture } = this.output.target; // the passes that write `output` need none
+    const nearest = { minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter, generateMipmaps: false } as const;
+    this.solid = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthTexture });
+    this.dithered = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthTexture, count: 3 });
+    for (const texture of [this.solid.texture, this.dithered.textures[2]]) {
+      texture.format = THREE.RGIntegerFormat;
+      texture.type = THREE.UnsignedIntType;
+      texture.internalFormat = 'RG32UI';
+    }
+    this.decoded = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthBuffer: false });
+    this.history = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthBuffer: false, type: this.output.target.texture.type });
+  }
+
+  get bytes(): number {
+    const { width, height } = this.decoded;
+    // Of solid, dithered and decoded, of the history, and of the depth.
+    const ofPixel = 8 + 16 + 4 + (this.output.distancesOfBytes ? 4 : 8) + 4;
+    return width * height * (ofPixel + this.output.bytesPerPixel);
+  }
+
+  private get all(): THREE.WebGLRenderTarget[] {
+    return [this.output.target, this.solid, this.dithered, this.decoded, this.history];
+  }
+
+  // Returns false if the size is already this one.
+  resize(width: number, height: number): boolean {
+    if (this.decoded.width === width && this.decoded.height === height) return false;
+    for (const target of this.all) target.setSize(width, height);
+    return true;
+  }
+
+  // Sets all of `solid` or `dithered` to 0.
+  clear(renderer: THREE.WebGLRenderer, target: THREE.WebGLRenderTarget): void {
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    renderer.setRenderTarget(target);
+    renderer.state.buffers.color.setMask(true);
+    target.textures.forEach(({ format }, n) => {
+      if (format === THREE.RGIntegerFormat) gl.clearBufferuiv(gl.COLOR, n, [0, 0, 0, 0]);
+      else gl.clearBufferfv(gl.COLOR, n, [0, 0, 0, 0]);
+    });
+  }
+
+  dispose(): void {
+    this.output.target.depthTexture?.dispose();
+    for (const target of this.all) target.dispose();
+  }
+}

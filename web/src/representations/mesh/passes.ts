@@ -1,0 +1,179 @@
+// The passes over a picture after its triangles are drawn: the colours of what is visible, one evaluation of a network
+// per pixel, and their blending with the frames before.
+import * as THREE from 'three';
+import { kHarmonics, layersShader } from '../../draw/network-shader';
+import type { DenseLayer } from '../../tiles/network';
+import { kFeatures } from './mesh-content';
+import { kPartNumbersSource, kVectorsBeforeNetwork } from './part-numbers';
+import { kHalfTransparent, kModeConstants } from './raster-program';
+
+const kVertexShader = `
+in vec3 position;
+void main() {
+  gl_Position = vec4(position.xy, 0.0, 1.0);
+}`;
+
+const kHead = `
+precision highp float;
+precision highp int;
+precision highp sampler2D;
+precision highp usampler2D;
+uniform vec4 part;
+uniform mat3 origin, ray;
+vec2 ndcOfPixel() {
+  return 2.0 * (gl_FragCoord.xy - part.xy) / part.zw - 1.0;
+}
+`;
+
+export function passMaterial(fragmentShader: string, uniforms: Record<string, THREE.IUniform>): THREE.RawShaderMaterial {
+  return new THREE.RawShaderMaterial({
+    glslVersion: THREE.GLSL3, vertexShader: kVertexShader, fragmentShader, uniforms,
+    depthTest: false, depthWrite: false, blending: THREE.NoBlending, toneMapped: false,
+  });
+}
+
+// Colours the pixels that show the sky, and leaves the others.
+export const kSkyShader = `${kHead}
+out vec4 colour;
+uniform usampler2D visible;
+uniform sampler2D opaqueDepth, sky;
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  if (texelFetch(visible, at, 0).x != 0u) discard;
+  if (texelFetch(opaqueDepth, min(at, textureSize(opaqueDepth, 0) - 1), 0).r < 1.0) discard;
+  vec3 d = ray * vec3(ndcOfPixel(), 1.0), size = abs(d);
+  int a = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  float along = d[a];
+  int side = 2 * a + (along < 0.0 ? 1 : 0);
+  vec2 place = 0.5 + 0.5 * vec2(d[(a + 1) % 3], d[(a + 2) % 3]) / abs(along);
+  vec2 edge = vec2(textureSize(sky, 0)) / vec2(1.0, 6.0);
+  vec2 texel = vec2(0.0, float(side) * edge.y) + 0.5 + (edge - 1.0) * place;
+  colour = vec4(textureLod(sky, texel / vec2(textureSize(sky, 0)), 0.0).rgb, 1.0);
+}`;
+
+// Colours the pixels of parts whose networks have a shape.
+export function decodeShader(shape: number, network: DenseLayer[]): string {
+  const features = [...Array(kFeatures).keys()].map((f) => `f${f >> 2}.${'xyzw'[f & 3]}`);
+  const harmonics = kHarmonics.slice(0, network[0].inputs - kFeatures);
+  const evaluate = (name: string, ofDirection: string[]) => {
+    const { lines, outputs } = layersShader([...features, ...ofDirection], network, (n) => `partVector(number, ${kVectorsBeforeNetwork + n})`);
+    return [
+      `vec3 ${name}(int number, vec4 f0, vec4 f1, vec3 d) {`, ...lines, `  return 1.0 / (1.0 + exp(-vec3(${outputs.join(', ')})));`, '}',
+    ].join('\n');
+  };
+  return `${kHead}
+${kModeConstants}
+${kPartNumbersSource}
+out vec4 colour;
+uniform usampler2D visible;
+uniform sampler2D featuresFirst, featuresSecond;
+uniform int display;
+${evaluate('decode', harmonics.map((one) => `(${one})`))}
+${evaluate('withoutDirection', harmonics.map((_, i) => (i === 0 ? kHarmonics[0] : '0.0')))}
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  int number = int(texelFetch(visible, at, 0).x & ${kHalfTransparent - 1}u) - 1;
+  if (number < 0) discard;
+  vec4 ofBlock = partVector(number, 4);
+  if (int(ofBlock.a) != ${shape}) discard;
+  vec4 first = texelFetch(featuresFirst, at, 0), second = texelFetch(featuresSecond, at, 0);
+  vec4 f0 = partVector(number, 0) + partVector(number, 2) * first, f1 = partVector(number, 1) + partVector(number, 3) * second;
+  vec3 d = normalize(ray * vec3(ndcOfPixel(), 1.0));
+  vec3 seen;
+  if (display == kShowFeatures || display == kShowTriangles || display == kShowAlpha) {
+    seen = first.rgb;
+  } else if (display == kShowDiffuse) {
+    seen = withoutDirection(number, f0, f1, d);
+  } else {
+    seen = decode(number, f0, f1, d);
+    if (display == kShowSpecular) seen = clamp(0.5 + seen - withoutDirection(number, f0, f1, d), 0.0, 1.0);
+    vec3 tint = display == kShowBlocks ? ofBlock.rgb : partVector(number, 5).rgb;
+    if (display == kShowBlocks || display == kShowLevels) seen = tint * (0.35 + 0.65 * dot(seen, vec3(0.3, 0.6, 0.1)));
+  }
+  colour = vec4(seen, 1.0);
+}`;
+}
+
+// Blends the frame with those before, and states the distance of the solid surface. The rules are those of
+// shaders/representations/mesh/blend_frames.comp. Whether a pixel of a moving picture is noisy is seen from the pixels
+// around it, as there is no list of its layers.
+export const kBlendShader = `${kHead}
+layout(location = 0) out vec4 colourAndOpacity;
+layout(location = 1) out vec4 distanceAndOpacity;
+uniform sampler2D decoded, history;
+uniform usampler2D visible, solid;
+uniform float weight;  // of this frame
+uniform bool hasHistory, isResting;
+uniform mat4 previousClip;  // of places relative to the reference point, in the previous picture
+uniform vec4 previousPart;
+const float kLargestDeviation = 1.0;
+
+// Weights of four pixels in a row for a place between the middle ones (Catmull and Rom).
+vec4 cubicWeights(float t) {
+  return vec4(t * (t * (1.0 - 0.5 * t) - 0.5), 1.0 + t * t * (1.5 * t - 2.5), t * (0.5 + t * (2.0 - 1.5 * t)),
+              t * t * (0.5 * t - 0.5));
+}
+
+vec4 mixHistory(vec2 position) {
+  vec2 low = previousPart.xy, high = previousPart.xy + previousPart.zw - 1.0;
+  vec2 at = clamp(position - 0.5, low, high), first = floor(at);
+  vec4 ofColumns = cubicWeights(at.x - first.x), ofRows = cubicWeights(at.y - first.y), sum = vec4(0.0);
+  for (int j = 0; j < 4; ++j) {
+    for (int i = 0; i < 4; ++i) {
+      vec2 texel = clamp(first + vec2(i - 1, j - 1), low, high);
+      sum += ofColumns[i] * ofRows[j] * texelFetch(history, ivec2(texel), 0);
+    }
+  }
+  return sum;
+}
+
+void main() {
+  ivec2 at = ivec2(gl_FragCoord.xy);
+  vec4 frame = texelFetch(decoded, at, 0);
+  colourAndOpacity = frame;
+  if (hasHistory && isResting) {
+    colourAndOpacity = mix(texelFetch(history, at, 0), frame, weight);
+  } else if (hasHistory) {
+    uvec2 seen = texelFetch(visible, at, 0).xy;
+    vec4 low = frame, high = frame, sum = vec4(0.0), squares = vec4(0.0);
+    uint flags = 0u;
+    ivec2 first = ivec2(part.xy), last = ivec2(part.xy + part.zw) - 1;
+    for (int j = -1; j <= 1; ++j) {
+      for (int i = -1; i <= 1; ++i) {
+        ivec2 beside = clamp(at + ivec2(i, j), first, last);
+        vec4 colour = texelFetch(decoded, beside, 0);
+        flags |= texelFetch(visible, beside, 0).x;
+        low = min(low, colour);
+        high = max(high, colour);
+        sum += colour;
+        squares += colour * colour;
+      }
+    }
+    vec2 ndc = ndcOfPixel();
+    vec3 d = normalize(ray * vec3(ndc, 1.0));
+    // The sky is infinitely far away.
+    vec4 place = seen.x == 0u ? vec4(d, 0.0) : vec4(origin * vec3(ndc, 1.0) + uintBitsToFloat(seen.y) * d, 1.0);
+    vec4 clip = previousClip * place;
+    vec2 previous = clip.xy / clip.w;
+    if ((flags & ${kHalfTransparent}u) != 0u && clip.w > 0.0 && max(abs(previous.x), abs(previous.y)) <= 1.0) {
+      vec4 mean = sum / 9.0, reach = kLargestDeviation * sqrt(max(squares / 9.0 - mean * mean, 0.0));
+      vec4 before = mixHistory(previousPart.xy + (0.5 + 0.5 * previous) * previousPart.zw);
+      colourAndOpacity = mix(clamp(before, max(low, mean - reach), min(high, mean + reach)), frame, weight);
+    }
+  }
+  uvec2 surface = texelFetch(solid, at, 0).xy;
+  float distance = uintBitsToFloat(surface.y);
+#ifdef DISTANCES_OF_BYTES
+  distance /= distance + 1.0;
+#else
+  distance = min(distance, 60000.0);  // half floats end at 65504
+#endif
+  distanceAndOpacity = surface.x == 0u ? vec4(0.0) : vec4(distance, 0.0, 0.0, 1.0);
+}`;
+
+export const kCopyShader = `${kHead}
+out vec4 copied;
+uniform sampler2D from;
+void main() {
+  copied = texelFetch(from, ivec2(gl_FragCoord.xy), 0);
+}`;

@@ -1,0 +1,49 @@
+// Where a picture is drawn from, relative to a reference point: the eye, or, of a parallel projection, the middle of the
+// image plane. All is computed in double precision, so that the GPU needs single precision only.
+import * as THREE from 'three';
+import { isParallel, type Picture } from '../../draw/picture';
+import type { Box, Vec3 } from '../../tiles/tileset';
+
+export function referencePoint({ origin: { elements } }: Pick<Picture, 'origin'>): THREE.Vector3 {
+  return new THREE.Vector3(elements[6], elements[7], elements[8]);
+}
+
+// Returns the matrix for places relative to a point.
+export function relativeTo(point: THREE.Vector3, matrix: THREE.Matrix4): THREE.Matrix4 {
+  return matrix.clone().multiply(new THREE.Matrix4().makeTranslation(point));
+}
+
+export function matrixRow({ elements }: THREE.Matrix4, row: number): THREE.Vector4 {
+  return new THREE.Vector4(elements[row], elements[4 + row], elements[8 + row], elements[12 + row]);
+}
+
+// Returns Picture.origin relative to the point.
+export function relativeOrigin(point: THREE.Vector3, origin: THREE.Matrix3): THREE.Matrix3 {
+  const moved = origin.clone();
+  point.toArray().forEach((x, row) => (moved.elements[6 + row] -= x));
+  return moved;
+}
+
+// Returns the projection for places relative to the point, with a near plane of its own (the user's might cut parts of
+// the scene off) and the far plane at infinity. `nearest` is the distance of the nearest place, scene units.
+export function rasterProjection(picture: Picture, clip: THREE.Matrix4, nearest: number): THREE.Matrix4 {
+  const projection = clip.clone();
+  if (isParallel(picture.camera)) return projection;
+  // The fourth row is the depth along the optical axis. Corners of the image have the smallest depth at a distance.
+  const w = matrixRow(clip, 3);
+  const depth = Math.min(...[-1, 1].flatMap((x) => [-1, 1].map((y) => {
+    const d = new THREE.Vector3(x, y, 1).applyMatrix3(picture.ray).normalize();
+    return d.x * w.x + d.y * w.y + d.z * w.z;
+  })));
+  const near = 0.5 * nearest * depth; // half, against rounding
+  const { elements } = projection;
+  elements[2] = w.x;
+  elements[6] = w.y;
+  elements[10] = w.z;
+  elements[14] = w.w - 2 * near;
+  return projection;
+}
+
+export function distanceToBox({ low, high }: Box, [x, y, z]: Vec3): number {
+  return Math.hypot(...[x, y, z].map((a, axis) => Math.max(low[axis] - a, 0, a - high[axis])));
+}

@@ -1,0 +1,179 @@
+// Tests features of `mesh` scenes in the browser that other scenes do not have, and whatever depends on how they are drawn.
+import { readFileSync } from 'node:fs';
+import type { Browser, Page } from 'playwright-core';
+import { afterAll, beforeAll, describe, expect, it } from 'vitest';
+import type { HeadlessPage, View } from '../src/headless-page';
+import { kCodecs } from '../src/representations/codecs';
+import { kMeshModes } from '../src/representations/mesh/mesh-modes';
+import { decodeTileset } from '../src/tiles/decode-tileset';
+import { countGpuMemory, type GpuMemory } from './gpu-memory';
+import { goldenMesh, launch, missing, serve, type Server } from './machine';
+import { isSame, psnr } from './pictures';
+import { openHeadlessPage } from './open-headless-page';
+import { viewAt, type Place } from './views';
+
+declare const headlessPage: HeadlessPage;
+declare const gpuMemory: GpuMemory;
+
+describe.skipIf(missing())('a scene of mesh', () => {
+  let server: Server;
+  let browser: Browser;
+  let page: Page;
+  const said: string[] = [];
+  const tileset = decodeTileset(readFileSync(`${goldenMesh}/tileset.json`, 'utf8'), 'tileset.json', kCodecs);
+  // Smaller than those of other tests, and off-centre.
+  const view = (eye: Place, target: Place): View => ({ ...viewAt(tileset, eye, target), cx: 126, width: 240, cy: 80, height: 160 });
+  const atFacade = view([-1, -2.2, 0.3], [-1, 0, 0.1]);
+  const above = view([0.3, -2.5, 1.5], [0, 0, -0.4]);
+
+  beforeAll(async () => {
+    [server, browser] = await Promise.all([serve(goldenMesh), launch()]);
+    page = await openHeadlessPage(browser, server, said);
+    await page.evaluate(() => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0 } }));
+    await page.evaluate(() => (headlessPage.city!.framesAtRest = 8));
+  });
+  afterAll(async () => {
+    await browser?.close();
+    server?.close();
+    expect(said).toEqual([]);
+  });
+
+  const shown = async () => new Uint8Array(Buffer.from(await page.evaluate(() => headlessPage.pixels()), 'base64'));
+  async function picture(views: View | View[]): Promise<Uint8Array> {
+    await page.evaluate((some) => headlessPage.settle(some), views);
+    return shown();
+  }
+  // Draws one frame of a motion.
+  async function frame(one: View): Promise<Uint8Array> {
+    await page.evaluate((at) => headlessPage.times(at, 1), one);
+    return shown();
+  }
+
+  it('has the same image each time that a view comes to rest', async () => {
+    const first = await picture(atFacade);
+    await picture(above);
+    expect(isSame(await picture(atFacade), first)).toBe(true);
+    await page.evaluate(() => headlessPage.loseGpu());
+    expect(isSame(await picture(atFacade), first)).toBe(true);
+  });
+
+  it('has less noise at rest than in one frame, and in motion, too', async () => {
+    const along = (i: number) => view([-1 + 0.002 * i, -2.2, 0.3], [-1 + 0.002 * i, 0, 0.1]);
+    await picture(view([6, 3, 0.5], [0, 0, 0])); // far away, so that the next frame has no history
+    const single = await frame(along(0));
+    for (let i = 1; i < 6; ++i) await frame(along(i));
+    const moving = await frame(along(6));
+    await page.evaluate(() => (headlessPage.city!.framesAtRest = 64));
+    const resting = await picture(along(6));
+    const restingAtFirst = await picture(along(0));
+    await page.evaluate(() => (headlessPage.city!.framesAtRest = 8));
+    expect(psnr(single, restingAtFirst)).toBeGreaterThan(15);
+    expect(psnr(moving, resting)).toBeGreaterThan(psnr(single, restingAtFirst) + 1);
+    expect(psnr(await picture(along(6)), resting)).toBeGreaterThan(psnr(moving, resting) + 3);
+  });
+
+  it('shows each camera of several what it shows it alone', async () => {
+    const views = [view([-1.05, -2.2, 0.3], [-1, 0, 0.1]), view([1.5, 0.9, 0.6], [3, 2, 0.3])];
+    const together = await picture(views);
+    const row = 3 * 480;
+    for (const [i, one] of views.entries()) {
+      const part = new Uint8Array(3 * 240 * 160);
+      for (let y = 0; y < 160; ++y) part.set(together.subarray(y * row + i * 720, y * row + (i + 1) * 720), 720 * y);
+      const alone = await picture(one);
+      expect(new Set(alone).size).toBeGreaterThan(20); // something is visible
+      expect(psnr(part, alone)).toBeGreaterThan(60);
+    }
+  });
+
+  it.each(kMeshModes.slice(1))('shows other colours in the mode $name', async ({ name }) => {
+    const colours = await picture(atFacade);
+    await page.evaluate((mode) => (headlessPage.city!.display = mode), name);
+    const others = await picture(atFacade);
+    await page.evaluate(() => (headlessPage.city!.display = 'colour'));
+    expect(new Set(others).size).toBeGreaterThan(5);
+    expect(psnr(colours, others)).toBeLessThan(33);
+  });
+
+  it('draws nothing in hidden boxes', async () => {
+    const whole = await picture(atFacade);
+    const hide = (...boxes: { low: number[]; high: number[] }[]) => page.evaluate((all) => headlessPage.hide(all), boxes);
+    await hide({ low: [-1.5, -0.4, -0.05], high: [-0.5, 0.4, 0.6] });
+    const without = await picture(atFacade);
+    const changed = whole.filter((value, i) => Math.abs(value - without[i]) > 8).length / whole.length;
+    expect(changed).toBeGreaterThan(0.02);
+    expect(changed).toBeLessThan(0.2);
+    await hide({ low: [-1.5, -0.4, 50], high: [-0.5, 0.4, 60] });
+    expect(isSame(await picture(atFacade), whole)).toBe(true);
+    await hide();
+  });
+
+  // Where a box stands just in front of what `pick` returns, it is visible, and just behind it hidden.
+  it.each([[0.5, -0.55], [-0.4, -0.6], [0.3, -0.7]])('has its surface where it is picked, at %f, %f', async (x, y) => {
+    const without = await picture(atFacade);
+    const place = await page.evaluate(([a, b]) => headlessPage.surfaceAt(a, b), [x, y]);
+    expect(place).toBeDefined();
+    const eye = [-1, -2.2, 0.3];
+    const distance = Math.hypot(...place!.map((one, a) => one - eye[a]));
+    const edge = 0.004 * distance;
+    const pixel = 3 * (Math.floor((0.5 - 0.5 * y) * 160) * 240 + Math.floor((0.5 + 0.5 * x) * 240));
+    const boxAt = async (share: number) => {
+      const middle = place!.map((one, a) => eye[a] + share * (one - eye[a]));
+      await page.evaluate(([low, high]) => headlessPage.addBox(low, high), [middle.map((one) => one - edge), middle.map((one) => one + edge)]);
+      const pixels = await picture(atFacade);
+      await page.evaluate(() => headlessPage.removeBox());
+      return [...pixels.subarray(pixel, pixel + 3)];
+    };
+    const [red, green] = await boxAt(1 - 0.02);
+    expect(red).toBeGreaterThan(235);
+    expect(green).toBeLessThan(20);
+    const behind = await boxAt(1 + 0.04);
+    behind.forEach((value, c) => expect(Math.abs(value - without[pixel + c])).toBeLessThan(9));
+  });
+
+  it('follows models that move while the camera rests', async () => {
+    await page.evaluate(() => headlessPage.addBox([-1.15, -0.8, 0], [-0.85, -0.6, 0.3]));
+    const reds = (pixels: Uint8Array) => pixels.filter((value, at) => at % 3 === 0 && value > 235 && pixels[at + 1] < 20).length;
+    const before = reds(await picture(atFacade));
+    expect(before).toBeGreaterThan(200);
+    await page.evaluate(() => headlessPage.world.getObjectByName('box')!.translateX(0.3));
+    await page.evaluate(() => headlessPage.world.getObjectByName('box')!.updateMatrix());
+    const moved = await picture(atFacade);
+    await page.evaluate(() => headlessPage.city!.leaveGpu()); // draws all anew
+    expect(psnr(await picture(atFacade), moved)).toBeGreaterThan(45);
+    await page.evaluate(() => headlessPage.removeBox());
+  });
+
+  it('stays within the budget of GPU memory, and is freed afterwards', async () => {
+    const other = await browser.newPage();
+    await other.addInitScript(countGpuMemory);
+    await other.goto(`${server.url}headless.html`);
+    await other.waitForFunction(() => 'headlessPage' in window);
+    const open = async (stream: { gpuBytes?: number }) => {
+      await other.evaluate((one) => headlessPage.open('scene/tileset.json', { selection: { maximumScreenSpaceError: 0.01 }, stream: one }), stream);
+      await other.evaluate(() => (headlessPage.city!.framesAtRest = 2));
+    };
+    await open({});
+    await other.evaluate((one) => headlessPage.settle(one), above);
+    const all = await other.evaluate(() => headlessPage.city!.statistics!);
+    expect(all.drawn).toEqual([2, 0]);
+    await other.evaluate(() => headlessPage.close());
+    const own = await other.evaluate(() => gpuMemory.bytes);
+    const budget = Math.round(all.gpuBytes * 0.85) + all.targetBytes;
+    await open({ gpuBytes: budget });
+    await other.evaluate(() => (gpuMemory.maximum = gpuMemory.bytes));
+    const over = (x: number) => view([x, 0.02, 0.1], [x, 0, -0.7]);
+    const levels: number[][] = [];
+    for (const one of [over(-1), above, over(1), above, over(-1.02)]) {
+      await other.evaluate((at) => headlessPage.settle(at), one);
+      const [maximum, { drawn }] = await other.evaluate(() => [gpuMemory.maximum, headlessPage.city!.statistics!] as const);
+      expect(maximum - own).toBeLessThanOrEqual(budget);
+      levels.push(drawn);
+    }
+    expect(levels).toContainEqual([1, 0]);
+    expect(levels).not.toContainEqual([2, 0]); // both do not fit
+    expect(await other.evaluate(() => headlessPage.errors)).toEqual([]);
+    await other.evaluate(() => headlessPage.close());
+    expect(await other.evaluate(() => gpuMemory.bytes)).toBeLessThanOrEqual(own * 1.05);
+    await other.close();
+  });
+});
