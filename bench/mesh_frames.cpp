@@ -1,14 +1,16 @@
 // mesh_frames SCENE CAPTURE [WIDTHxHEIGHT]: the images of a mesh scene on a GPU against those on the CPU. For the views
 // of the held-out photos: exact images, single dithered frames, the mean of 64. For a flight through these views: each
 // frame with and without blending. Views are pinholes without the photos' distortion, except for exact images, which
-// are also drawn through the photos' lens. Prints JSON. See mesh.sh.
+// are also drawn through the photos' lens. Prints JSON. ONLY=decoders, views or flight measures only that. See mesh.sh.
 #include <fmt/format.h>
 
 #include <array>
+#include <chrono>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "base/error.h"
 #include "eval/psnr.h"
@@ -24,7 +26,7 @@
 namespace tessera {
 namespace {
 
-constexpr int kFramesOfMean = 64, kFramesOfView = 24;
+constexpr int kFramesOfMean = 64, kFramesOfView = 24, kFramesAtRest = 8;
 constexpr double kMetresOfFrame = 0.5;  // 15 m/s with 30 frames per second
 constexpr uint64_t kBudgetBytes = uint64_t{4} << 30;
 
@@ -116,7 +118,29 @@ void compareViews(Renderers& renderers, const std::vector<View>& views, nlohmann
   result[fmt::format("{}_frames", kFramesOfMean)] = describe(mean);
 }
 
-// The frames of a flight from view to view.
+// The time of a frame with the network evaluated once per pixel, and for every fragment, as in the paper. Both draw the
+// same views in turns, and the faster of two frames counts.
+void compareDecoders(Renderers& renderers, const std::vector<View>& views, nlohmann::ordered_json& result) {
+  const std::array<std::unique_ptr<GpuSceneRenderer>, 2> gpu = {renderers.onGpu({.decodesFragments = false}),
+                                                                renderers.onGpu({.decodesFragments = true})};
+  std::array<double, 2> seconds = {0, 0};
+  for (const View& view : views) {
+    std::array<double, 2> fastest = {INFINITY, INFINITY};
+    for (int frame = 0; frame < 3; ++frame) {
+      for (size_t kind = 0; kind < gpu.size(); ++kind) {
+        const auto begin = std::chrono::steady_clock::now();
+        gpu[kind]->draw(view.pinhole, view.worldFromCamera);
+        gpu[kind]->lastImage();  // waits
+        const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - begin;
+        if (frame > 0) fastest[kind] = std::min(fastest[kind], taken.count());  // the first one loads tiles
+      }
+    }
+    for (size_t kind = 0; kind < gpu.size(); ++kind) seconds[kind] += fastest[kind] / static_cast<double>(views.size());
+  }
+  result["seconds_of_frame"] = {{"decoded_once_per_pixel", seconds[0]}, {"every_fragment_decoded", seconds[1]}};
+}
+
+// The frames of a flight from each view towards the next one.
 void compareFlight(Renderers& renderers, const std::vector<View>& views, nlohmann::ordered_json& result) {
   const std::array<std::pair<const char*, GpuMeshSettings>, 3> kinds = {{
       {"without_blending", {.jitters = false, .blends = false}},
@@ -128,9 +152,14 @@ void compareFlight(Renderers& renderers, const std::vector<View>& views, nlohman
   std::array<std::vector<double>, kinds.size()> sharp, smooth;
   double largestLoss = -INFINITY;
   for (size_t i = 0; i + 1 < views.size(); ++i) {
+    // Each stretch begins at rest. Frames are not blended with those of another one, as an exact image is between them.
+    for (const auto& one : renderer) {
+      one->render(views[i].pinhole, views[i].worldFromCamera, nullptr);
+      for (int frame = 0; frame < kFramesAtRest; ++frame) one->draw(views[i].pinhole, views[i].worldFromCamera);
+    }
     const Eigen::Quaterniond from(views[i].worldFromCamera.rotation), to(views[i + 1].worldFromCamera.rotation);
     const Vec3d way = views[i + 1].worldFromCamera.translation - views[i].worldFromCamera.translation;
-    for (int frame = 0; frame < kFramesOfView; ++frame) {
+    for (int frame = 1; frame <= kFramesOfView; ++frame) {
       const double share = std::min(1.0, frame * kMetresOfFrame / way.norm());
       Pose pose;
       pose.rotation = from.slerp(share, to).toRotationMatrix();
@@ -168,8 +197,11 @@ int run(int argc, char** argv) {
   const std::vector<View> views = heldOutViews(readCapture(argv[2]), width, height);
   Renderers renderers(argv[1]);
   nlohmann::ordered_json result = {{"device", renderers.name()}, {"views", views.size()}};
-  if (std::getenv("FLIGHT") == nullptr) compareViews(renderers, views, result);
-  compareFlight(renderers, views, result);
+  const char* const only = std::getenv("ONLY");
+  const auto isWanted = [only](const char* row) { return only == nullptr || std::string_view(only) == row; };
+  if (isWanted("decoders")) compareDecoders(renderers, views, result);
+  if (isWanted("views")) compareViews(renderers, views, result);
+  if (isWanted("flight")) compareFlight(renderers, views, result);
   std::printf("%s\n", result.dump(2).c_str());
   return 0;
 }

@@ -331,6 +331,25 @@ TEST_F(GpuDrawing, DitheredFramesOfMeshHaveTheExactImageAsTheirMean) {
   }
 }
 
+TEST_F(GpuDrawing, FramesOfMeshAreTheSameIfFragmentsAreDecoded) {
+  const MeshPlace mesh;
+  GpuRendererSettings settings;
+  settings.draw.exact = false;
+  const auto drawFrame = [&](bool decodesFragments) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    GpuMeshSettings drawing;
+    drawing.decodesFragments = decodesFragments;
+    GpuSceneRenderer gpu(stream, makeGpuMeshDrawer(stream, drawing), {mesh.frame, mesh.tree, mesh.source(), {}},
+                         settings);
+    gpu.draw(flightCamera(), flightPose(200));
+    return gpu.lastImage();
+  };
+  const RenderedView once = drawFrame(false), everywhere = drawFrame(true);
+  EXPECT_GT(decibels(everywhere.colour, once.colour), 55);
+  for (size_t i = 0; i < once.depth.pixels.size(); ++i)
+    ASSERT_NEAR(everywhere.depth.pixels[i], once.depth.pixels[i], 1e-3f * (1 + once.depth.pixels[i])) << i;
+}
+
 TEST_F(GpuDrawing, ReadsContentsInTheBackgroundUntilTheImageEqualsTheBlockingOne) {
   GpuRendererSettings settings;
   settings.selection.maximumScreenSpaceError = 0.5;

@@ -96,7 +96,9 @@ struct MeshViewArguments {
   UintPointer sky;   // bytes of [6][edge][edge][3]; optional
   uint skyEdge;
   uint isSamePixels;  // whether the pixels of the raster are those of the view
-  UintPointer visible;  // [height][width][2] of the raster: part + 1 (0: none) and triangle
+  // [height][width][2] of the raster: part + 1 (0: none) and triangle; or [4], if fragments are decoded: bits of the colour
+  // and of the distance (0: none).
+  UintPointer visible;
   UintPointer nearest;  // [height][width]: 1 / depth of the nearest half-transparent layer, bits of a float; 0: none
   float jitter[2];      // offset of what pixels show, in pixels
   uint frame;           // number of the frame, for dithering
@@ -122,10 +124,12 @@ struct BlendFramesArguments {
   float shift[3];               // of the eye, in the axes of the previous camera, world units
   float focal[2];               // of the previous camera, a pinhole, in pixels
   float centre[2];
-  uint restingFrames;    // how many frames of the same view the history counts as at most; 0: the view has changed
-  float smallestWeight;  // of the frame if it has
+  uint restingFrames;      // how many frames of the same view the history counts as at most; 0: the view has changed
+  float smallestWeight;    // of the frame if it has
+  float largestDeviation;  // of the history from the mean around the pixel, in standard deviations
+  uint unused;
 };
-TESSERA_SIZE(BlendFramesArguments, 240);
+TESSERA_SIZE(BlendFramesArguments, 248);
 
 // The triangles of one part.
 struct DrawTrianglesArguments {

@@ -1,5 +1,6 @@
 // One invocation per pixel: blends a frame with the frames before it (temporal anti-aliasing): with their mean if the
 // view has not changed, otherwise with what they showed at the same place, limited to the colours around the pixel.
+// Source of the limits: Salvi 2016, "An Excursion in Temporal Supersampling".
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../../compute/kernel.glsl"
@@ -70,16 +71,21 @@ void main() {
       frames = min(a.history.values[5 * pixel + 4], float(a.restingFrames));
     } else if (previousPosition(a, pixel, position)) {
       frames = min(mixHistory(a, position, history), 1 / a.smallestWeight - 1);
-      vec4 low = frame, high = frame;
+      vec4 low = frame, high = frame, sum = vec4(0), squares = vec4(0);
+      float count = 0;
       const ivec2 at = ivec2(gl_GlobalInvocationID.xy), last = ivec2(a.view.width - 1, a.view.height - 1);
       for (int y = max(at.y - 1, 0); y <= min(at.y + 1, last.y); ++y) {
         for (int x = max(at.x - 1, 0); x <= min(at.x + 1, last.x); ++x) {
           const vec4 beside = frameAt(a.view, uint(y) * a.view.width + uint(x));
           low = min(low, beside);
           high = max(high, beside);
+          sum += beside;
+          squares += beside * beside;
+          ++count;
         }
       }
-      history = clamp(history, low, high);
+      const vec4 mean = sum / count, reach = a.largestDeviation * sqrt(max(squares / count - mean * mean, 0));
+      history = clamp(history, max(low, mean - reach), min(high, mean + reach));
     }
   }
   const vec4 blended = mix(history, frame, 1 / (frames + 1));

@@ -1,4 +1,4 @@
-// One invocation per pixel: the colour of the triangle that is visible in it.
+// One invocation per pixel: the colour of the triangle that is visible in it, which fragments have decoded with DECODED.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "../../compute/kernel.glsl"
@@ -46,15 +46,25 @@ void main() {
       at = uvec2(position);
     }
     const float nearest = uintBitsToFloat(a.nearest.values[at.y * a.raster.width + at.x]);
+#ifdef DECODED
+    const uint first = 4 * (at.y * a.raster.width + at.x);
+    distance = uintBitsToFloat(a.visible.values[first + 3]);
+    const uint number = distance > 0 ? 1 : 0;
+#else
     const uint first = 2 * (at.y * a.raster.width + at.x), number = a.visible.values[first];
+#endif
     if (number > 0) {
+#ifdef DECODED
+      colour = uintBitsToFloat(uvec3(a.visible.values[first], a.visible.values[first + 1], a.visible.values[first + 2]));
+#else
       const uint triangle = a.visible.values[first + 1];
       PlacedPartArguments placed = a.parts.values[number - 1];
       const TriangleHit hit = hitTriangle(placed, triangle, direction);
       const uint patchNumber = patchTriangle(placed.part.value.pairs, triangle).patchNumber;
       colour = decode(placed.part, placeInPatch(placed.part, patchNumber, hit.place), directionHarmonics(direction));
-      opacity = 1;
       distance = hit.distance;
+#endif
+      opacity = 1;
       // A layer is as near as itself, but for rounding errors and jitter.
       if (nearest * distance > 0.999) noise = 1;
     } else if (a.skyEdge > 0 && farthestDistance(a.view, pixel) >= kSceneEnd) {

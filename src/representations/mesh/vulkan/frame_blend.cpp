@@ -10,7 +10,11 @@ namespace tessera {
 namespace {
 
 constexpr size_t kNumbersOfPixel = 5;
-constexpr float kSmallestWeight = 0.04f;  // as in Unreal Engine: the mean of about 25 frames
+// Measured (docs/benchmarks.md): a smaller weight, such as the 0.04 of Unreal Engine, removes more noise, but each
+// frame resamples the history, whose error exceeds that noise after a few frames.
+constexpr float kSmallestWeight = 0.6f;
+constexpr float kLargestDeviation = 1;  // of the history from the mean around the pixel, in standard deviations
+constexpr double kCosineOfCut = 0.96;   // a camera that turns by more than 16° between frames has jumped
 
 }  // namespace
 
@@ -42,13 +46,13 @@ void FrameBlend::blend(GpuFrame& frame, const Camera& camera, const Pose& worldF
                       worldFromCamera.translation == worldFromCamera_.translation && !isChanged;
   const bool canReproject = camera.width == camera_.width && camera.height == camera_.height &&
                             isPinhole(camera.lens) && isPinhole(camera_.lens);
-  if (!isSame && !canReproject) frames_ = 0;
   std::swap(histories_[0], histories_[1]);
   arguments::BlendFramesArguments blending = {};
   blending.view = frame.view();
-  if (frames_ > 0) blending.history = histories_[0].address();
   blending.blended = histories_[1].address();
   const Mat3d previousFromCamera = worldFromCamera_.rotation.transpose() * worldFromCamera.rotation;
+  const bool isCut = previousFromCamera.trace() < 1 + 2 * kCosineOfCut;
+  if (!isSame && (!canReproject || isCut)) frames_ = 0;
   const Vec3d shift =
       worldFromCamera_.rotation.transpose() * (worldFromCamera.translation - worldFromCamera_.translation);
   for (int row = 0; row < 3; ++row) {
@@ -60,9 +64,11 @@ void FrameBlend::blend(GpuFrame& frame, const Camera& camera, const Pose& worldF
   blending.focal[1] = static_cast<float>(camera_.focalY());
   blending.centre[0] = static_cast<float>(camera_.centreX());
   blending.centre[1] = static_cast<float>(camera_.centreY());
+  if (frames_ > 0) blending.history = histories_[0].address();
   blending.noise = noise;
   blending.restingFrames = isSame ? atRest_ : 0;
   blending.smallestWeight = kSmallestWeight;
+  blending.largestDeviation = kLargestDeviation;
   frame.run(blend_, blending);
   frame.run(show_, blending);
   atRest_ = isSame && frames_ > 0 ? atRest_ + 1 : 1;

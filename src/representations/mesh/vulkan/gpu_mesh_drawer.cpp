@@ -13,6 +13,7 @@
 #include "representations/mesh/vulkan/visible_layers.h"
 #include "shaders/composite_layers.h"
 #include "shaders/decode_visible.h"
+#include "shaders/decode_visible_decoded.h"
 
 namespace tessera {
 namespace {
@@ -52,7 +53,7 @@ class GpuMeshDrawer final : public GpuDrawer {
         kernels_(stream->context()),
         parts_(stream),
         lists_(stream, settings.listedFragments),
-        visible_(stream),
+        visible_(stream, settings.decodesFragments),
         blend_(stream) {}
 
   ~GpuMeshDrawer() override {
@@ -124,7 +125,9 @@ class GpuMeshDrawer final : public GpuDrawer {
       mesh.jitter[0] = static_cast<float>(radicalInverse(index, 2) - 0.5);
       mesh.jitter[1] = static_cast<float>(radicalInverse(index, 3) - 0.5);
     }
-    const GpuKernel& decode = kernels_.get(kDecodeVisibleSpirv, parts_.maxWidth());
+    using Spirv = std::span<const uint32_t>;
+    const Spirv spirv = settings_.decodesFragments ? Spirv(kDecodeVisibleDecodedSpirv) : Spirv(kDecodeVisibleSpirv);
+    const GpuKernel& decode = kernels_.get(spirv, parts_.maxWidth());
     for (RasterView raster : rasters_.views) {
       if (rasters_.isSamePixels) {
         raster.centreX -= mesh.jitter[0];

@@ -1,18 +1,27 @@
 #include "representations/mesh/vulkan/visible_layers.h"
 
 #include "shaders/dither_layers.h"
+#include "shaders/dither_layers_decoded.h"
 #include "shaders/patch_triangles_places.h"
 
 namespace tessera {
 namespace {
 
-GraphicsPipelineOptions ditheringOptions() {
+using Spirv = std::span<const uint32_t>;
+
+constexpr ImageFormat kVisible = ImageFormat::rg32Uint, kDecoded = ImageFormat::rgba32Float;
+
+GraphicsPipelineOptions ditheringOptions(ImageFormat format) {
   GraphicsPipelineOptions options;
-  options.colours = {{ImageFormat::rg32Uint}};
+  options.colours = {{format}};
   options.depth = ImageFormat::depth32Float;
   options.depthCompare = VK_COMPARE_OP_GREATER;
   options.fragmentStores = true;
   return options;
+}
+
+size_t bytesOfNearest(ImageSize size) {
+  return size_t{size.width} * size.height * sizeof(float);
 }
 
 }  // namespace
@@ -25,18 +34,24 @@ VisibleLayers::~VisibleLayers() {
     if (*buffer) stream_->deferDestroy(std::move(*buffer));
 }
 
+const GpuGraphicsPipeline& VisibleLayers::pipelineFor(uint32_t maxWidth) {
+  std::unique_ptr<GpuGraphicsPipeline>& pipeline = pipelines_[decodesFragments_ ? maxWidth : 0];
+  if (pipeline) return *pipeline;
+  GraphicsPipelineOptions options = ditheringOptions(decodesFragments_ ? kDecoded : kVisible);
+  if (decodesFragments_) options.constants = {maxWidth};
+  const Spirv fragments = decodesFragments_ ? Spirv(kDitherLayersDecodedSpirv) : Spirv(kDitherLayersSpirv);
+  pipeline = std::make_unique<GpuGraphicsPipeline>(stream_->context(), kPatchTrianglesPlacesSpirv, fragments, options);
+  return *pipeline;
+}
+
 void VisibleLayers::ensureRaster(ImageSize size) {
   const std::shared_ptr<const GpuContext>& context = stream_->context();
-  if (!pipeline_) {
-    pipeline_ = std::make_unique<GpuGraphicsPipeline>(context, kPatchTrianglesPlacesSpirv, kDitherLayersSpirv,
-                                                      ditheringOptions());
-    view_ = stream_->makeBuffer(sizeof(arguments::MeshViewArguments));
-  }
+  if (!view_) view_ = stream_->makeBuffer(sizeof(arguments::MeshViewArguments));
   if (image_ && image_->size() == size) return;
   for (auto* pass : {&background_, &tiles_, &more_})
     if (*pass) stream_->deferDestroy(std::move(*pass));
   if (image_) stream_->deferDestroy(std::move(image_));
-  image_ = stream_->makeImage(size, ImageFormat::rg32Uint);
+  image_ = stream_->makeImage(size, decodesFragments_ ? kDecoded : kVisible);
   const std::shared_ptr<GpuImage> depth = stream_->makeImage(size, ImageFormat::depth32Float);
   const auto makePass = [&](LoadOperation colours, LoadOperation depths) {
     return std::make_shared<GpuRenderPass>(context, std::vector<ColourAttachment>{{.image = image_, .load = colours}},
@@ -51,18 +66,19 @@ void VisibleLayers::ensureRaster(ImageSize size) {
     visible_ = stream_->makeBuffer(image_->copiedBytes());
     if (nearest_) stream_->deferDestroy(std::move(nearest_));
     nearest_ = GpuBuffer();
-    nearest_ = stream_->makeBuffer(image_->copiedBytes() / 2);
+    nearest_ = stream_->makeBuffer(bytesOfNearest(size));
   }
 }
 
 void VisibleLayers::draw(arguments::MeshViewArguments& view, const PlacedParts& parts) {
+  const GpuGraphicsPipeline& pipeline = pipelineFor(parts.maxWidth());
   ensureRaster({view.raster.width, view.raster.height});
   view.visible = visible_.address();
   view.nearest = nearest_.address();
-  stream_->fillZero(nearest_, 0, image_->copiedBytes() / 2);
+  stream_->fillZero(nearest_, 0, bytesOfNearest(image_->size()));
   stream_->upload(view_, 0, std::as_bytes(std::span(&view, 1)));
-  drawParts(*stream_, *pipeline_, view_.address(), parts.ofBackground(), *background_, *more_);
-  drawParts(*stream_, *pipeline_, view_.address(), parts.ofTiles(), *tiles_, *more_);
+  drawParts(*stream_, pipeline, view_.address(), parts.ofBackground(), *background_, *more_);
+  drawParts(*stream_, pipeline, view_.address(), parts.ofTiles(), *tiles_, *more_);
   stream_->copy(*image_, visible_, 0);
 }
 

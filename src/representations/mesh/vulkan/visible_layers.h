@@ -1,6 +1,8 @@
-// The triangle that is visible in each pixel of a raster: of half-transparent ones, in each frame those that dithering
-// selects.
+// The triangle that is visible in each pixel of a raster, or its colour: of half-transparent triangles, in each frame
+// those that dithering selects.
 #pragma once
+
+#include <map>
 
 #include "representations/mesh/vulkan/placed_parts.h"
 #include "shaders/representations/mesh/arguments_mesh.h"
@@ -9,7 +11,9 @@ namespace tessera {
 
 class VisibleLayers {
  public:
-  explicit VisibleLayers(std::shared_ptr<GpuStream> stream) : stream_(std::move(stream)) {}
+  // `decodesFragments`: GpuMeshSettings.
+  VisibleLayers(std::shared_ptr<GpuStream> stream, bool decodesFragments)
+      : stream_(std::move(stream)), decodesFragments_(decodesFragments) {}
   ~VisibleLayers();
   VisibleLayers(const VisibleLayers&) = delete;
   VisibleLayers& operator=(const VisibleLayers&) = delete;
@@ -19,10 +23,12 @@ class VisibleLayers {
   void draw(arguments::MeshViewArguments& view, const PlacedParts& parts);
 
  private:
+  const GpuGraphicsPipeline& pipelineFor(uint32_t maxWidth);
   void ensureRaster(ImageSize size);
 
   std::shared_ptr<GpuStream> stream_;
-  std::unique_ptr<GpuGraphicsPipeline> pipeline_;
+  bool decodesFragments_;
+  std::map<uint32_t, std::unique_ptr<GpuGraphicsPipeline>> pipelines_;  // by the maximum width of layers; 0: any
   std::shared_ptr<const GpuImage> image_;
   // Of the background block; then of tiles; of further parts of either.
   std::shared_ptr<const GpuRenderPass> background_, tiles_, more_;
