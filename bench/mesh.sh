@@ -36,6 +36,9 @@
 #   vulkan       300 steps with `vulkan` against `cpu`: PSNR of the training photos
 #   frames       images of that scene on a GPU, or on a Vulkan driver for the CPU, against those on the CPU: exact ones, the
 #                mean of 64 dithered frames, and each frame of a flight
+#   browser      that scene in Debian's Chromium with Mesa's OpenGL on the CPU: images against those on the CPU, distances between
+#                picked places against the truth, frame time and triangles of each level, and frame time of `volume` of the same
+#                place (trained for as long, unless build/bench/mesh/city-volume.scene exists)
 #   fallback     the ordinary glTF meshes in the contents of that scene's finest level, in Blender, assimp and three.js: they load with
 #                the same numbers of triangles; and held-out views of three.js and Blender, without mipmaps and antialiasing, against
 #                the scene without view dependence (every hit has the base colour of its texels), the scene as it is, an
@@ -603,6 +606,23 @@ frames() {
   verdict "largest loss of a frame by blending, dB" "$(jq .flight.largest_loss_without_jitter "$result")" '<=' 0.5
 }
 
+browser() {
+  need_tessera
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  if [ ! -e "$work/city-volume.scene/tileset.json" ]; then
+    trained city-volume city --method volume --minutes 15
+    "$tessera" bake "$work/city-volume" "$work/city-volume.scene"
+  fi
+  tools/install-debian-packages.sh --browser
+  tools/build-web.sh
+  local root=$PWD
+  (cd web && SCENE="$root/$work/city-mesh.scene" CAPTURE="$root/$work/city" VOLUME="$root/$work/city-volume.scene" OUT="$root/$work/browser" \
+    TESSERA=$(realpath "$root/$tessera") xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" \
+    npx vitest run bench/mesh.ts --config vitest.bench.config.ts --disable-console-intercept)
+}
+
 # withoutMasks FROM TO: copies a capture without its masks.
 withoutMasks() {
   rm -rf "$2.part"
@@ -750,7 +770,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan frames fallback yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan frames browser fallback yardstick fox beach}; do
   "$row"
 done
 finish
