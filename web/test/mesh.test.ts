@@ -107,6 +107,32 @@ describe.skipIf(missing())('a scene of mesh', () => {
     await hide();
   });
 
+  it('draws a content that is shown in place of several tiles in each of them', async () => {
+    const whole = await picture(above);
+    const parts = await page.evaluate(async (one) => {
+      const { drawer } = headlessPage.city as any;
+      const draw = drawer.draw.bind(drawer) as (view: any, settings: any) => boolean;
+      let count = 0;
+      // Cuts the box of each tile in two.
+      drawer.draw = (all: any, settings: any) => draw({
+        ...all,
+        contents: all.contents.map((parts: any[]) => parts.flatMap((part) => {
+          if (part.content.isBackground) return [part];
+          count += 2;
+          const far = 1e9;
+          const { low: [x0], high: [x1] } = part.content.box;
+          const middle = 0.5 * (x0 + x1);
+          return [[-far, middle], [middle, far]].map(([from, to]) => ({ content: part.content, within: { low: [from, -far, -far], high: [to, far, far] } }));
+        })),
+      }, settings);
+      await headlessPage.settle(one);
+      drawer.draw = draw;
+      return count;
+    }, above);
+    expect(parts).toBeGreaterThan(3);
+    expect(psnr(await shown(), whole)).toBeGreaterThan(50);
+  });
+
   // Where a box stands just in front of what `pick` returns, it is visible, and just behind it hidden.
   it.each([[0.5, -0.55], [-0.4, -0.6], [0.3, -0.7]])('has its surface where it is picked, at %f, %f', async (x, y) => {
     const without = await picture(atFacade);

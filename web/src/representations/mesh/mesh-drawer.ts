@@ -34,7 +34,7 @@ interface DrawnMeshPart {
   row: number; // in the texture of numbers
   geometry: THREE.BufferGeometry;
   uniforms: Uniforms;
-  meshes: Partial<Record<RasterKind, TriangleMesh>>;
+  meshes: Partial<Record<RasterKind, TriangleMesh[]>>; // one for each time that it is drawn in a picture
 }
 
 export interface DrawnMesh {
@@ -169,7 +169,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     for (const { row, geometry, meshes } of parts) {
       this.numbers.remove(row);
       geometry.dispose();
-      for (const mesh of Object.values(meshes)) mesh.material.dispose();
+      for (const [{ material }] of Object.values(meshes)) material.dispose();
     }
   }
 
@@ -309,14 +309,23 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     { camera }: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, isBackground: boolean, point: THREE.Vector3,
   ): void {
     const meshes: TriangleMesh[] = [];
+    const times = new Map<DrawnMesh, number>(); // a content may be drawn in place of several tiles
     for (const { content, within = kEverywhere } of frontToBack) {
       if (content.isBackground !== isBackground) continue;
-      for (const [order, { part, geometry, uniforms, meshes: ofPart }] of content.parts.entries()) {
-        if (part.patches === 0) continue;
-        uniforms.partOrigin.value.set(...part.origin).sub(point);
-        uniforms.withinLow.value.set(...within.low).sub(point);
-        uniforms.withinHigh.value.set(...within.high).sub(point);
-        const mesh = (ofPart[kind] ??= this.makeTriangles(kind, geometry, uniforms, content.isCompressed, order));
+      const time = times.get(content) ?? 0;
+      times.set(content, time + 1);
+      const low = new THREE.Vector3(...within.low).sub(point);
+      const high = new THREE.Vector3(...within.high).sub(point);
+      for (const [order, drawn] of content.parts.entries()) {
+        if (drawn.part.patches === 0) continue;
+        drawn.uniforms.partOrigin.value.set(...drawn.part.origin).sub(point);
+        const ofKind = (drawn.meshes[kind] ??= []);
+        const mesh = (ofKind[time] ??= this.makeTriangles(kind, drawn, content.isCompressed, order, ofKind[0]));
+        mesh.onBeforeRender = () => {
+          drawn.uniforms.withinLow.value.copy(low);
+          drawn.uniforms.withinHigh.value.copy(high);
+          mesh.material.uniformsNeedUpdate = true;
+        };
         mesh.renderOrder = meshes.length;
         meshes.push(mesh);
       }
@@ -327,10 +336,11 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.triangles.children = [];
   }
 
+  // `other`: triangles of the same part and kind, whose material they share.
   private makeTriangles(
-    kind: RasterKind, geometry: THREE.BufferGeometry, uniforms: Uniforms, isCompressed: boolean, order: number,
+    kind: RasterKind, { geometry, uniforms }: DrawnMeshPart, isCompressed: boolean, order: number, other?: TriangleMesh,
   ): TriangleMesh {
-    const material = rasterMaterial(kind, isCompressed);
+    const material = other?.material ?? rasterMaterial(kind, isCompressed);
     material.uniforms = uniforms;
     // Of equal triangles, that of the first part is in front, as depths differ by rounding.
     material.polygonOffset = order > 0;
