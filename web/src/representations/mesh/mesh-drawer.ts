@@ -5,7 +5,7 @@ import { colourOfBlock, colourOfLevel } from '../../draw/display-modes';
 import { selectHiddenBoxes, kMaxHiddenBoxes } from '../../draw/hidden-boxes';
 import { farthestDepth } from '../../draw/opaque-depth';
 import { drawIntoTargets } from '../../draw/own-targets';
-import type { Picture } from '../../draw/picture';
+import { isParallel, type Picture } from '../../draw/picture';
 import { readSurface } from '../../draw/read-surface';
 import { kFarAway, type ContentPlace, type DrawnPart, type DrawnScene, type DrawSettings, type SceneDrawer, type SceneView } from '../../draw/scene-drawer';
 import { screenTriangle } from '../../draw/screen-triangle';
@@ -17,7 +17,8 @@ import { MeshTargets } from './mesh-targets';
 import { MeshTextures } from './mesh-textures';
 import { PartNumbers } from './part-numbers';
 import { decodeShader, kBlendShader, kCopyShader, kSkyShader, passMaterial } from './passes';
-import { bytesOfIndices, patchGeometry } from './patch-geometry';
+import { makeChunks, selectRuns, visibleHalfSpaces, type PatchChunk } from './patch-chunks';
+import { bytesOfIndices, drawRange, patchGeometry } from './patch-geometry';
 import { distanceToBox, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
 import { rasterMaterial, type RasterKind } from './raster-program';
 
@@ -33,6 +34,7 @@ interface DrawnMeshPart {
   part: MeshPart;
   row: number; // in the texture of numbers
   geometry: THREE.BufferGeometry;
+  chunks: PatchChunk[];
   uniforms: Uniforms;
   meshes: Partial<Record<RasterKind, TriangleMesh[]>>; // one for each time that it is drawn in a picture
 }
@@ -147,7 +149,9 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
         withinLow: { value: new THREE.Vector3() }, withinHigh: { value: new THREE.Vector3() },
         isBackground: { value: backgroundBlock }, hiddenBoxes: { value: 0 },
       };
-      return { part, row, geometry: patchGeometry(part, content.texels[n].vertices), uniforms, meshes: {} };
+      const { vertices } = content.texels[n];
+      const geometry = patchGeometry(part, vertices);
+      return { part, row, geometry, chunks: makeChunks(vertices), uniforms, meshes: {} };
     });
     this.numbers.shapes.slice(this.decoders.length).forEach((network) => {
       this.decoders.push(this.makePass(decodeShader(this.decoders.length, network)));
@@ -309,25 +313,30 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     { camera }: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, isBackground: boolean, point: THREE.Vector3,
   ): void {
     const meshes: TriangleMesh[] = [];
-    const times = new Map<DrawnMesh, number>(); // a content may be drawn in place of several tiles
+    const halfSpaces = visibleHalfSpaces(this.uniforms.clipFromReference.value, isParallel(camera));
+    const times = new Map<DrawnMeshPart, number>(); // a part may be drawn in several runs, and in place of several tiles
     for (const { content, within = kEverywhere } of frontToBack) {
       if (content.isBackground !== isBackground) continue;
-      const time = times.get(content) ?? 0;
-      times.set(content, time + 1);
       const low = new THREE.Vector3(...within.low).sub(point);
       const high = new THREE.Vector3(...within.high).sub(point);
       for (const [order, drawn] of content.parts.entries()) {
         if (drawn.part.patches === 0) continue;
         drawn.uniforms.partOrigin.value.set(...drawn.part.origin).sub(point);
-        const ofKind = (drawn.meshes[kind] ??= []);
-        const mesh = (ofKind[time] ??= this.makeTriangles(kind, drawn, content.isCompressed, order, ofKind[0]));
-        mesh.onBeforeRender = () => {
-          drawn.uniforms.withinLow.value.copy(low);
-          drawn.uniforms.withinHigh.value.copy(high);
-          mesh.material.uniformsNeedUpdate = true;
-        };
-        mesh.renderOrder = meshes.length;
-        meshes.push(mesh);
+        const limits = { low: low.toArray(), high: high.toArray() };
+        for (const run of selectRuns(drawn.chunks, drawn.part, drawn.uniforms.partOrigin.value, halfSpaces, limits)) {
+          const time = times.get(drawn) ?? 0;
+          times.set(drawn, time + 1);
+          const ofKind = (drawn.meshes[kind] ??= []);
+          const mesh = (ofKind[time] ??= this.makeTriangles(kind, drawn, content.isCompressed, order, ofKind[0]));
+          mesh.onBeforeRender = () => {
+            drawRange(drawn.geometry, run);
+            drawn.uniforms.withinLow.value.copy(low);
+            drawn.uniforms.withinHigh.value.copy(high);
+            mesh.material.uniformsNeedUpdate = true;
+          };
+          mesh.renderOrder = meshes.length;
+          meshes.push(mesh);
+        }
       }
     }
     if (meshes.length === 0) return;

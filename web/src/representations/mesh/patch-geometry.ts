@@ -1,6 +1,7 @@
 // The triangles of a part as geometry of three.js. A patch has four corners, and gl_VertexID is 4 · patch + corner.
 import * as THREE from 'three';
 import { kCornerNumbers, type MeshPart } from './mesh-content';
+import type { PatchRun } from './patch-chunks';
 
 const kCorners = [0, 1, 2, 3, 2, 1]; // of two triangles
 const kLargestOfTwoBytes = 0xfffe; // 0xffff restarts primitives
@@ -30,6 +31,11 @@ export function patchGeometry({ patches, pairs }: Pick<MeshPart, 'patches' | 'pa
   geometry.setIndex(untilUploaded(new THREE.BufferAttribute(indices, 1)));
   geometry.boundingSphere = new THREE.Sphere(); // three.js sorts what it draws by it; the order is that of renderOrder
   return geometry;
+}
+
+// Limits what is drawn to a run of patches.
+export function drawRange(geometry: THREE.BufferGeometry, { first, patches }: PatchRun): void {
+  geometry.setDrawRange(kCorners.length * first, kCorners.length * patches);
 }
 
 // Keeps the numbers in the page only until they are on the GPU.
