@@ -44,6 +44,8 @@
 #                the scene without view dependence (every hit has the base colour of its texels), the scene as it is, an
 #                implementation by Embree of what glTF says, and photos without distortion. Where no triangle covers a pixel, the
 #                scene's sky is put in. Needs blender, python3-numpy, assimp-utils and chromium of Debian
+#   gltf         that scene's finest level as `tessera export --format gltf` writes it, in one file: errors of glTF-Validator, and
+#                Blender and three.js as for `fallback`
 #   yardstick    that scene against the city's true triangles with as many texels, coloured by the training photos: an ideal
 #                photogrammetric mesh
 #   fox, beach   real photographs, 10 minutes each: held-out PSNR of the baked scene
@@ -712,6 +714,36 @@ fallback() {
   done
 }
 
+gltf() {
+  need_tessera
+  local program=build/release/bench/mesh_fallback folder=$work/gltf scene=$work/city-mesh.scene name
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  scene city-mesh city
+  [ -d web/node_modules/three ] || tools/build-web.sh --packages-only
+  if [ ! -s "$folder/compared.json" ]; then
+    [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_fallback"
+    [ -e "$work/pinhole/transforms.json" ] || "$tessera" synth city "$work/pinhole" --blocks 2x2 --pinhole
+    mkdir -p "$folder/exported"
+    "$tessera" export "$scene" "$folder/exported/scene.glb" --format gltf
+    "$program" views "$scene" "$work/pinhole" "$folder"
+    jq '.contents = [{uri: "scene.glb", triangles: ([.contents[].triangles] | add)}]' "$folder/views.json" > "$folder/views.part"
+    mv "$folder/views.part" "$folder/views.json"
+    node bench/fallback_three.mjs "$folder/exported" "$folder" > "$folder/three.json"
+    blender -b --python-exit-code 1 --python bench/fallback_blender.py -- "$folder/exported" "$folder" \
+      > "$folder/blender.log" 2>&1 || die "$folder/blender.log: $(grep -i error "$folder/blender.log" | tail -n 1)"
+    "$program" compare "$scene" "$work/pinhole" "$folder" > "$folder/compared.part"
+    mv "$folder/compared.part" "$folder/compared.json"
+  fi
+  verdict "exported glTF, errors of glTF-Validator" "$(node bench/validate_gltf.mjs "$folder/exported")" '<=' 0
+  for name in three blender; do
+    verdict "$name, triangles of the exported glTF less those of the scene" \
+      "$(jq --slurpfile loaded "$folder/$name.json" '$loaded[0][0] - .contents[0].triangles | fabs' "$folder/views.json")" '<=' 0
+    verdict "$name, PSNR of the exported glTF against the scene without view dependence in dB" \
+      "$(jq --arg name "$name" '.[$name].plain.psnr * 100 | round / 100' "$folder/compared.json")" '>=' 25
+  done
+}
+
 yardstick() {
   need_tessera
   local program=build/release/bench/mesh_yardstick file=$work/yardstick.json
@@ -770,7 +802,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan frames browser fallback yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan frames browser fallback gltf yardstick fox beach}; do
   "$row"
 done
 finish

@@ -99,10 +99,19 @@ TEST_F(MeshCommandLine, TrainsPartsApartBakesAndRendersASyntheticCity) {
   const Said drawn = run({"render", at("scene"), at("pictures"), "--views", at("city"), "--size", "24x18"});
   EXPECT_EQ(drawn.exitCode, 0) << drawn.err;
 
+  const json exported = told({"export", at("scene"), at("scene.glb"), "--format", "gltf", "--level", "1", "--json"});
+  EXPECT_EQ(exported.at("bytes_on_disk"), fs::file_size(folder_ / "scene.glb"));
+  EXPECT_GT(exported.at("triangles"), 0);
+  EXPECT_EQ(told({"export", at("scene"), at("tiles"), "--format", "gltf", "--split", "--json"}).at("files"), 3)
+      << "two tiles and the background block";
+
   told({"bake", at("model"), at("small"), "--json", "--maps", "inferred", "--fallback", "0"});
   const json small = told({"info", at("small"), "--json"});
   EXPECT_GE(small.at("shared_resources").at("files"), 1) << "encoders of blocks";
   EXPECT_EQ(psnr("small"), finest) << "the same textures";
+  const Said unexported = run({"export", at("small"), at("small.glb"), "--format", "gltf"});
+  EXPECT_EQ(unexported.exitCode, 1);
+  EXPECT_TRUE(contains(unexported.err, "--fallback 1")) << unexported.err;
   told({"bake", at("model"), at("pieces"), "--json", "--tiles-per-block", "2", "--texels", "12"});
   const json pieces = told({"info", at("pieces"), "--json"});
   EXPECT_EQ(pieces.at("blocks").at("columns"), 4);

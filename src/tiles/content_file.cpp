@@ -67,28 +67,6 @@ std::optional<json> decodeAsset(std::string_view text, std::string_view represen
   return asset;
 }
 
-// Returns the scene's nodes and, above its roots, the node that turns Z-up into Y-up.
-Json turnedNodes(const GltfScene& scene) {
-  Json nodes = scene.nodes;
-  Json turned = {{"children", scene.roots}};
-  turned["matrix"] = {1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1};  // column-major
-  nodes.push_back(std::move(turned));
-  return nodes;
-}
-
-// Adds the scene's arrays to the asset; empty ones are left out, because glTF forbids them.
-void addScene(const GltfScene& scene, Json& asset) {
-  for (const std::string& extension : scene.extensionsUsed) asset["extensionsUsed"].push_back(extension);
-  asset["scenes"][0]["nodes"] = {scene.nodes.size()};
-  asset["nodes"] = turnedNodes(scene);
-  const std::pair<const char*, const Json&> members[] = {{"meshes", scene.meshes},       {"accessors", scene.accessors},
-                                                         {"materials", scene.materials}, {"textures", scene.textures},
-                                                         {"images", scene.images},       {"samplers", scene.samplers}};
-  for (const auto& [key, member] : members) {
-    if (!member.empty()) asset[key] = member;
-  }
-}
-
 }  // namespace
 
 size_t ContentFileWriter::addView(std::span<const std::byte> bytes, uint32_t target) {
@@ -118,7 +96,7 @@ Bytes ContentFileWriter::finish(std::string_view representation, const Json& our
                 {"buffers", {{{"byteLength", bytes_.size()}}}},
                 {"bufferViews", views_},
                 {"extensions", {{kContentExtension, std::move(extension)}}}};
-  if (!scene.isEmpty()) addScene(scene, asset);
+  if (!scene.isEmpty()) scene.addTo(asset);
   return encodeGlb(asset.dump(), bytes_);
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/file.h"
+#include "tiles/gltf_scene.h"
 #include "tiles/tileset.h"
 
 namespace tessera {
@@ -21,22 +22,6 @@ inline constexpr size_t kMaxContentJson = size_t{8} << 20;  // bytes
 inline constexpr const char* kNoGlb = "is not a binary glTF 2.0 file, or is cut short";
 inline constexpr const char* kWebP = "image/webp";
 inline constexpr const char* kRawBytes = "application/octet-stream";
-
-// What other programs draw of a content: arrays of the glTF asset itself, each empty if unused. Accessors and images
-// refer to buffer views by the indices that ContentFileWriter::addView returns.
-struct GltfScene {
-  using Json = nlohmann::ordered_json;
-
-  Json accessors = Json::array(), meshes = Json::array(), materials = Json::array();
-  Json textures = Json::array(), images = Json::array(), samplers = Json::array();
-  // In Z-up coordinates of the tile frame. Since glTF is Y-up, the writer adds a node above `roots` that maps (x, y, z)
-  // to (x, z, -y).
-  Json nodes = Json::array();
-  std::vector<size_t> roots;                // indices into `nodes`
-  std::vector<std::string> extensionsUsed;  // by the members above, for example "KHR_materials_unlit"
-
-  bool isEmpty() const { return nodes.empty(); }
-};
 
 class ContentFileWriter {
  public:

@@ -28,14 +28,15 @@ size_t padded(size_t length) {
 
 }  // namespace
 
-Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes) {
-  const size_t jsonLength = padded(json.size()), bytesLength = padded(bytes.size());
-  const size_t total = kHeader + kChunkHeader + jsonLength + (bytes.empty() ? 0 : kChunkHeader + bytesLength);
-  CHECK(total <= kLargestGlb);
-  Bytes file(total);
+Bytes encodeGlbStart(std::string_view json, uint64_t bytes) {
+  CHECK(bytes % 4 == 0u);
+  const size_t jsonLength = padded(json.size());
+  const size_t start = kHeader + kChunkHeader + jsonLength + (bytes == 0 ? 0 : kChunkHeader);
+  CHECK(start + bytes <= kLargestGlb);
+  Bytes file(start);
   put32(file.data(), kMagic);
   put32(file.data() + 4, kVersion);
-  put32(file.data() + 8, static_cast<uint32_t>(total));
+  put32(file.data() + 8, static_cast<uint32_t>(start + bytes));
   std::byte* at = file.data() + kHeader;
   put32(at, static_cast<uint32_t>(jsonLength));
   put32(at + 4, kJsonChunk);
@@ -43,10 +44,17 @@ Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes) {
   std::memset(at, ' ', jsonLength);
   if (!json.empty()) std::memcpy(at, json.data(), json.size());
   at += jsonLength;
-  if (bytes.empty()) return file;
-  put32(at, static_cast<uint32_t>(bytesLength));
+  if (bytes == 0) return file;
+  put32(at, static_cast<uint32_t>(bytes));
   put32(at + 4, kBytesChunk);
-  std::memcpy(at + kChunkHeader, bytes.data(), bytes.size());
+  return file;
+}
+
+Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes) {
+  Bytes file = encodeGlbStart(json, padded(bytes.size()));
+  const size_t start = file.size();
+  file.resize(start + padded(bytes.size()));
+  if (!bytes.empty()) std::memcpy(file.data() + start, bytes.data(), bytes.size());
   return file;
 }
 

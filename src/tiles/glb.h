@@ -21,6 +21,9 @@ inline constexpr uint64_t kLargestGlb = 0xffffffffu;  // bytes: GLB stores lengt
 // Encodes a GLB. Pads the JSON with spaces and the bytes with zeros, each to a multiple of 4. CHECKs that the file is
 // at most kLargestGlb bytes long.
 Bytes encodeGlb(std::string_view json, std::span<const std::byte> bytes);
+// Returns what precedes the bytes in such a file, for writers that do not hold them in memory. `bytes`: their number, a
+// multiple of 4. CHECKs as encodeGlb does.
+Bytes encodeGlbStart(std::string_view json, uint64_t bytes);
 
 inline constexpr size_t kGlbStart = 20;  // bytes before the JSON
 // Returns the length of the JSON chunk from the first kGlbStart bytes of a file of `fileBytes` bytes; nothing if these

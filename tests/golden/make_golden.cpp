@@ -65,7 +65,7 @@ Bytes encodeWithFallback(const MeshContent& mesh, const std::string& name, const
     const Bytes png = encodePng(baseColourTexture(mesh.parts[i]));
     const std::string uri = writer.addResource(name + "_" + std::to_string(i), "png", png);
     tileset.resources.push_back({uri, "image/png", png.size()});
-    fallback.add(mesh.parts[i], "../../" + uri);
+    fallback.add(mesh.parts[i], pngAt("../../" + uri));
   }
   return encodeMesh(mesh, std::move(file), fallback.scene());
 }

@@ -370,7 +370,7 @@ class MeshBaker final : public Baker {
       const Bytes png = encodePng(growing.textures[i]);
       const uint32_t resource = sink_->addResource(textureName(level, cells, i), kPng, png);
       textureBytes += png.size();
-      fallback.add(content.parts[i], "../../" + sink_->resourceUri(resource));
+      fallback.add(content.parts[i], pngAt("../../" + sink_->resourceUri(resource)));
     }
     summary.counts = {{"triangles", content.triangles()}, {"patches", patches}, {"fallback_bytes", textureBytes}};
     sink_->add(level, cells, encodeMesh(content, std::move(file), fallback.scene()), summary, growing.resources);

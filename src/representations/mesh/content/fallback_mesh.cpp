@@ -7,29 +7,53 @@ namespace tessera {
 namespace {
 
 // Constants of glTF, which are those of OpenGL.
-constexpr uint32_t kVertices = 34962, kIndices = 34963, kFloat = 5126, kUnsignedInt = 5125, kTriangles = 4;
+constexpr uint32_t kTriangles = 4;
 constexpr uint32_t kLinear = 9729, kClampToEdge = 33071;
 constexpr const char* kUnlit = "KHR_materials_unlit";
 
 }  // namespace
 
+OrdinaryTriangles makeOrdinaryTriangles(const PatchSet& part, const Similarity& frameFromScene) {
+  OrdinaryTriangles triangles;
+  if (part.patches == 0) return triangles;
+  triangles.middle = frameFromScene * part.corner(0, 0);
+  const uint32_t across = part.patchesAcross(), edge = part.patchEdge;
+  for (uint32_t patch = 0; patch < part.patches; ++patch) {
+    for (uint32_t number = 0; number < 4; ++number) {
+      const bool isUsed = number < 3 || patch < part.pairs;
+      const Vec3f at = (frameFromScene * part.corner(patch, isUsed ? number : 0) - triangles.middle).cast<float>();
+      triangles.positions.insert(triangles.positions.end(), at.begin(), at.end());
+      const double column = patch % across * edge + (number & 1) * (edge - 1) + 0.5,
+                   row = patch / across * edge + (number >> 1) * (edge - 1) + 0.5;
+      triangles.places.push_back(static_cast<float>(column / part.textureWidth()));
+      triangles.places.push_back(static_cast<float>(row / part.textureHeight()));
+    }
+    for (const uint32_t corner : {0u, 1u, 2u}) triangles.corners.push_back(4 * patch + corner);
+    if (patch < part.pairs)
+      for (const uint32_t corner : {3u, 2u, 1u}) triangles.corners.push_back(4 * patch + corner);
+  }
+  return triangles;
+}
+
+GltfScene::Json pngAt(const std::string& uri) {
+  return {{"uri", uri}, {"mimeType", "image/png"}};
+}
+
 size_t FallbackMesh::addAccessor(std::span<const std::byte> bytes, uint32_t target, uint32_t componentType,
                                  size_t count, const char* type) {
-  scene_.accessors.push_back({{"bufferView", file_.addView(bytes, target)},
-                              {"componentType", componentType},
-                              {"count", count},
-                              {"type", type}});
+  scene_.accessors.push_back(
+      {{"bufferView", addView_(bytes, target)}, {"componentType", componentType}, {"count", count}, {"type", type}});
   return scene_.accessors.size() - 1;
 }
 
-size_t FallbackMesh::addMaterial(const std::string& textureUri) {
+size_t FallbackMesh::addMaterial(const GltfScene::Json& image) {
   if (scene_.samplers.empty()) {
     // Without mipmaps, which would mix neighbouring patches.
     scene_.samplers.push_back(
         {{"magFilter", kLinear}, {"minFilter", kLinear}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}});
     scene_.extensionsUsed.push_back(kUnlit);
   }
-  scene_.images.push_back({{"uri", textureUri}, {"mimeType", "image/png"}});
+  scene_.images.push_back(image);
   scene_.textures.push_back({{"sampler", 0}, {"source", scene_.images.size() - 1}});
   GltfScene::Json material;
   material["pbrMetallicRoughness"]["baseColorTexture"]["index"] = scene_.textures.size() - 1;
@@ -42,49 +66,35 @@ size_t FallbackMesh::addMaterial(const std::string& textureUri) {
   return scene_.materials.size() - 1;
 }
 
-void FallbackMesh::add(const PatchSet& part, const std::string& textureUri) {
+void FallbackMesh::add(const PatchSet& part, const GltfScene::Json& image, const std::string& name) {
   if (part.patches == 0) return;
-  // Positions are relative to a node, so that floats are precise enough.
-  const Vec3d middle = tileFromScene_ * part.corner(0, 0);
-  std::vector<float> positions, places;
+  const OrdinaryTriangles triangles = makeOrdinaryTriangles(part, tileFromScene_);
   Vec3f low = Vec3f::Constant(INFINITY), high = Vec3f::Constant(-INFINITY);
-  const uint32_t across = part.patchesAcross(), edge = part.patchEdge;
-  for (uint32_t patch = 0; patch < part.patches; ++patch) {
-    for (uint32_t number = 0; number < 4; ++number) {
-      const Vec3f at = (tileFromScene_ * part.corner(patch, number) - middle).cast<float>();
-      low = low.cwiseMin(at);
-      high = high.cwiseMax(at);
-      positions.insert(positions.end(), at.begin(), at.end());
-      const double column = patch % across * edge + (number & 1) * (edge - 1) + 0.5,
-                   row = patch / across * edge + (number >> 1) * (edge - 1) + 0.5;
-      places.push_back(static_cast<float>(column / part.textureWidth()));
-      places.push_back(static_cast<float>(row / part.textureHeight()));
-    }
+  for (size_t at = 0; at < triangles.positions.size(); at += 3) {
+    const Eigen::Map<const Vec3f> position(&triangles.positions[at]);
+    low = low.cwiseMin(position);
+    high = high.cwiseMax(position);
   }
-  std::vector<uint32_t> corners;
-  for (uint32_t patch = 0; patch < part.patches; ++patch) {
-    for (const uint32_t corner : {0u, 1u, 2u}) corners.push_back(4 * patch + corner);
-    if (patch < part.pairs)
-      for (const uint32_t corner : {3u, 2u, 1u}) corners.push_back(4 * patch + corner);
-  }
-  const size_t vertices = size_t{4} * part.patches;
-  const size_t position = addAccessor(std::as_bytes(std::span(positions)), kVertices, kFloat, vertices, "VEC3");
+  const size_t vertices = triangles.positions.size() / 3;
+  const size_t position =
+      addAccessor(std::as_bytes(std::span(triangles.positions)), kGltfVertices, kGltfFloat, vertices, "VEC3");
   scene_.accessors[position]["min"] = {low.x(), low.y(), low.z()};
   scene_.accessors[position]["max"] = {high.x(), high.y(), high.z()};
   GltfScene::Json primitive;
   primitive["attributes"]["POSITION"] = position;
   primitive["attributes"]["TEXCOORD_0"] =
-      addAccessor(std::as_bytes(std::span(places)), kVertices, kFloat, vertices, "VEC2");
-  primitive["indices"] =
-      addAccessor(std::as_bytes(std::span(corners)), kIndices, kUnsignedInt, corners.size(), "SCALAR");
+      addAccessor(std::as_bytes(std::span(triangles.places)), kGltfVertices, kGltfFloat, vertices, "VEC2");
+  primitive["indices"] = addAccessor(std::as_bytes(std::span(triangles.corners)), kGltfIndices, kGltfUnsignedInt,
+                                     triangles.corners.size(), "SCALAR");
   primitive["mode"] = kTriangles;
-  primitive["material"] = addMaterial(textureUri);
+  if (!image.is_null()) primitive["material"] = addMaterial(image);
   GltfScene::Json mesh;
   mesh["primitives"].push_back(primitive);
-  scene_.meshes.push_back(mesh);
   GltfScene::Json node;
+  if (!name.empty()) mesh["name"] = node["name"] = name;
+  scene_.meshes.push_back(mesh);
   node["mesh"] = scene_.meshes.size() - 1;
-  node["translation"] = {middle.x(), middle.y(), middle.z()};
+  node["translation"] = {triangles.middle.x(), triangles.middle.y(), triangles.middle.z()};
   scene_.nodes.push_back(node);
   scene_.roots.push_back(scene_.nodes.size() - 1);
 }

@@ -12,7 +12,7 @@
 
 namespace tessera {
 
-struct GltfScene;         // tiles/content_file.h
+struct GltfScene;         // tiles/gltf_scene.h
 class ContentFileWriter;  // tiles/content_file.h
 
 inline constexpr uint32_t kMaxSkyEdge = 1024;
