@@ -141,4 +141,21 @@ std::vector<uint8_t> encodeBc4Image(std::span<const uint8_t> texels, uint32_t wi
   return bytes;
 }
 
+std::vector<uint8_t> decodeBc4Image(std::span<const uint8_t> blocks, uint32_t width, uint32_t height) {
+  CHECK((width % 4 == 0 && height % 4 == 0));
+  CHECK(blocks.size() == size_t{width} * height / 2);
+  std::vector<uint8_t> texels(size_t{width} * height);
+  const uint8_t* from = blocks.data();
+  for (uint32_t y = 0; y < height; y += 4) {
+    for (uint32_t x = 0; x < width; x += 4, from += sizeof(Bc4Block)) {
+      Bc4Block block;
+      std::copy_n(from, block.size(), block.begin());
+      const std::array<float, 16> decoded = decodeBc4(block);
+      for (uint32_t i = 0; i < 16; ++i)
+        texels[size_t{y + i / 4} * width + x + i % 4] = static_cast<uint8_t>(decoded[i] + 0.5f);
+    }
+  }
+  return texels;
+}
+
 }  // namespace tessera

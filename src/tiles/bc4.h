@@ -32,5 +32,7 @@ Bc4Block encodeBc4(const Bc4Texels& texels, Bc4Effort effort);
 
 // Encodes an image of one channel, whose sides are multiples of 4: blocks row by row.
 std::vector<uint8_t> encodeBc4Image(std::span<const uint8_t> texels, uint32_t width, uint32_t height, Bc4Effort effort);
+// Decodes such blocks to [height][width] texels, rounded to the nearest byte.
+std::vector<uint8_t> decodeBc4Image(std::span<const uint8_t> blocks, uint32_t width, uint32_t height);
 
 }  // namespace tessera

@@ -115,5 +115,18 @@ TEST(Bc4, DividesAnImageIntoBlocksRowByRow) {
   for (size_t block = 0; block < 6; ++block) EXPECT_EQ(bytes[8 * block], block / 2 * 100 + block % 2 * 50);
 }
 
+TEST(Bc4, DecodesAnImageAsItsBlocks) {
+  const RandomStream random(10, 4);
+  std::vector<uint8_t> blocks;
+  for (uint64_t i = 0; i < 8 * 6; ++i) blocks.push_back(static_cast<uint8_t>(random.below(i, 256)));
+  const std::vector<uint8_t> texels = decodeBc4Image(blocks, 8, 12);
+  ASSERT_EQ(texels.size(), 8u * 12);
+  for (uint32_t y = 0; y < 12; ++y)
+    for (uint32_t x = 0; x < 8; ++x) {
+      const uint8_t* const block = blocks.data() + 8 * (x / 4 + 2 * (y / 4));
+      EXPECT_NEAR(texels[8 * y + x], decodeBc4Texel(block, x % 4 + 4 * (y % 4)), 0.5001) << x << " " << y;
+    }
+}
+
 }  // namespace
 }  // namespace tessera
