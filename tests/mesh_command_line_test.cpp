@@ -102,8 +102,15 @@ TEST_F(MeshCommandLine, TrainsPartsApartBakesAndRendersASyntheticCity) {
   const json exported = told({"export", at("scene"), at("scene.glb"), "--format", "gltf", "--level", "1", "--json"});
   EXPECT_EQ(exported.at("bytes_on_disk"), fs::file_size(folder_ / "scene.glb"));
   EXPECT_GT(exported.at("triangles"), 0);
-  EXPECT_EQ(told({"export", at("scene"), at("tiles"), "--format", "gltf", "--split", "--json"}).at("files"), 3)
-      << "two tiles and the background block";
+  const json& triangles = baked.at("levels").at(0).at("triangles");
+  EXPECT_EQ(told({"export", at("scene"), at("tiles"), "--format", "gltf", "--split", "--json"}).at("triangles"),
+            triangles);
+  const json forUnreal = told({"export", at("scene"), at("unreal"), "--format", "unreal", "--json"});
+  EXPECT_EQ(forUnreal.at("triangles"), triangles);
+  EXPECT_EQ(forUnreal.at("decoders"), forUnreal.at("parts")) << "each block has a decoder of its own";
+  const Said split = run({"export", at("scene"), at("unreal"), "--format", "unreal", "--split"});
+  EXPECT_EQ(split.exitCode, 1);
+  EXPECT_TRUE(contains(split.err, "has no meaning for the format unreal")) << split.err;
 
   told({"bake", at("model"), at("small"), "--json", "--maps", "inferred", "--fallback", "0"});
   const json small = told({"info", at("small"), "--json"});

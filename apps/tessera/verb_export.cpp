@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "export/gltf.h"
 #include "export/merf.h"
+#include "export/unreal.h"
 
 namespace tessera {
 namespace {
@@ -48,6 +49,19 @@ Json runGltfExport(const ExportFlags& flags) {
           {"triangles", exported.triangles}};
 }
 
+Json runUnrealExport(const ExportFlags& flags) {
+  const UnrealExport exported = exportUnreal(flags.scene, flags.out, {.level = flags.level});
+  if (!flags.json) {
+    fmt::print("{}: {:.1f} MB, {} triangles in {} parts; run {}/import_scene.py in the Unreal editor\n", flags.out,
+               static_cast<double>(exported.bytesOnDisk) / 1e6, exported.triangles, exported.parts, flags.out);
+  }
+  return {{"bytes_on_disk", exported.bytesOnDisk},
+          {"level", flags.level},
+          {"parts", exported.parts},
+          {"decoders", exported.decoders},
+          {"triangles", exported.triangles}};
+}
+
 void requireFormat(const ExportFlags& flags, const char* flag, bool isGiven,
                    std::initializer_list<const char*> formats) {
   if (!isGiven || std::find(formats.begin(), formats.end(), flags.format) != formats.end()) return;
@@ -64,19 +78,24 @@ void addExportVerb(CLI::App& app) {
       "  tessera export garden.scene garden.merf --format merf");
   verb->add_option("scene", flags->scene, "scene folder")->required();
   verb->add_option("out", flags->out, "folder to write; a file that ends in .glb for gltf without --split")->required();
-  verb->add_option("--format", flags->format,
-                   "gltf: ordinary triangles of a mesh scene; merf: what the public web viewer of MERF reads, of a "
-                   "volume scene baked of one contracted block")
+  verb->add_option(
+          "--format", flags->format,
+          "gltf: ordinary triangles of a mesh scene; merf: what the public web viewer of MERF reads, of a "
+          "volume scene baked of one contracted block; unreal: neural textures of a mesh scene, and a script that "
+          "imports them into Unreal Engine")
       ->required()
-      ->check(CLI::IsMember({"gltf", "merf"}));
-  const CLI::Option* level = verb->add_option("--level", flags->level, "gltf: level of detail; 0 is the finest");
+      ->check(CLI::IsMember({"gltf", "merf", "unreal"}));
+  const CLI::Option* level =
+      verb->add_option("--level", flags->level, "gltf, unreal: level of detail; 0 is the finest");
   verb->add_flag("--split", flags->split, "gltf: a folder with one file for each tile");
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   verb->callback([flags, level] {
-    requireFormat(*flags, "--level", level->count() > 0, {"gltf"});
+    requireFormat(*flags, "--level", level->count() > 0, {"gltf", "unreal"});
     requireFormat(*flags, "--split", flags->split, {"gltf"});
     Json result = {{"format", flags->format}};
-    result.update(flags->format == "gltf" ? runGltfExport(*flags) : runMerfExport(*flags));
+    result.update(flags->format == "gltf"     ? runGltfExport(*flags)
+                  : flags->format == "unreal" ? runUnrealExport(*flags)
+                                              : runMerfExport(*flags));
     if (flags->json) fmt::print("{}\n", result.dump(2));
   });
 }
