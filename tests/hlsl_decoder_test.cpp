@@ -2,9 +2,13 @@
 // compares them with the decoder on the CPU.
 #include "export/hlsl_decoder.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 

@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "base/image_io.h"
 #include "representations/mesh/content/mesh_payload.h"
+#include "tiles/content_file.h"
 #include "tiles/glb.h"
 #include "tiles/read_content.h"
 #include "tiles/scene_folder.h"
