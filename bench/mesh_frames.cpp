@@ -142,10 +142,9 @@ void compareDecoders(Renderers& renderers, const std::vector<View>& views, nlohm
 
 // The frames of a flight from each view towards the next one.
 void compareFlight(Renderers& renderers, const std::vector<View>& views, nlohmann::ordered_json& result) {
-  const std::array<std::pair<const char*, GpuMeshSettings>, 3> kinds = {{
-      {"without_blending", {.jitters = false, .blends = false}},
-      {"without_jitter", {.jitters = false, .blends = true}},
-      {"with_jitter", {.jitters = true, .blends = true}},
+  const std::array<std::pair<const char*, GpuMeshSettings>, 2> kinds = {{
+      {"without_blending", {.blends = false}},
+      {"with_blending", {.blends = true}},
   }};
   std::vector<std::unique_ptr<GpuSceneRenderer>> renderer;
   for (const auto& [name, settings] : kinds) renderer.push_back(renderers.onGpu(settings));
@@ -180,7 +179,7 @@ void compareFlight(Renderers& renderers, const std::vector<View>& views, nlohman
     flight[kinds[kind].first] = describe(sharp[kind]);
     flight[kinds[kind].first]["against_16_samples"] = describe(smooth[kind]);
   }
-  flight["largest_loss_without_jitter"] = largestLoss;
+  flight["largest_loss_by_blending"] = largestLoss;
   result["flight"] = flight;
 }
 

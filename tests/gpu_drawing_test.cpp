@@ -331,6 +331,44 @@ TEST_F(GpuDrawing, DitheredFramesOfMeshHaveTheExactImageAsTheirMean) {
   }
 }
 
+// Returns the mean of squares of `edge` × `edge` pixels.
+ImageF shrink(const ImageF& image, int edge) {
+  ImageF mean(image.width / edge, image.height / edge, image.channels);
+  for (int y = 0; y < image.height; ++y)
+    for (int x = 0; x < image.width; ++x)
+      for (int c = 0; c < image.channels; ++c)
+        mean.at(x / edge, y / edge)[c] += image.at(x, y)[c] / static_cast<float>(edge * edge);
+  return mean;
+}
+
+TEST_F(GpuDrawing, FramesOfMeshAtRestHaveSmoothEdges) {
+  constexpr int kEdge = 4;
+  const MeshPlace mesh;
+  const auto stream = std::make_shared<GpuStream>(context_);
+  GpuRendererSettings settings;
+  settings.draw.exact = false;
+  settings.selection.maximumScreenSpaceError = 0;  // the same contents at all sizes
+  GpuSceneRenderer gpu(stream, makeGpuMeshDrawer(stream), {mesh.frame, mesh.tree, mesh.source(), {}}, settings);
+  const Camera camera = flightCamera(), fine = camera.scaledTo(kEdge * camera.width, kEdge * camera.height);
+  const ImageF expected = shrink(gpu.render(fine, flightPose(0), nullptr).colour, kEdge);
+  const ImageF rough = gpu.render(camera, flightPose(0), nullptr).colour;
+  do gpu.draw(camera, flightPose(0));
+  while (gpu.hasMore());
+  const ImageF smooth = gpu.lastImage().colour;
+  // At edges the middle of a pixel has another colour than the whole of it.
+  int edges = 0;
+  double ofRough = 0, ofSmooth = 0;
+  for (size_t i = 0; i < expected.pixels.size(); ++i) {
+    const float difference = std::abs(rough.pixels[i] - expected.pixels[i]);
+    if (difference < 0.1f) continue;
+    ++edges;
+    ofRough += difference;
+    ofSmooth += std::abs(smooth.pixels[i] - expected.pixels[i]);
+  }
+  EXPECT_GT(edges, 30);
+  EXPECT_LT(ofSmooth, 0.5 * ofRough);
+}
+
 TEST_F(GpuDrawing, FramesOfMeshAreTheSameIfFragmentsAreDecoded) {
   const MeshPlace mesh;
   GpuRendererSettings settings;

@@ -76,6 +76,7 @@ export class TesseraScene extends THREE.Object3D {
   display: DisplayMode = 'colour';
   featureLevel = 1; // the level that `featureLevel` display modes show: 0 for the coarse features, up to `featureLevels`
   framesAtRest = 64; // how many frames are blended where nothing moves, in scenes whose frames are noisy
+  antialiases = true; // these frames show different places within the pixels, so that edges are smooth
   minTransmittance = 1 / 255; // rays end below this transmittance; 0: never
   // Boxes in which nothing of the scene is drawn, at most kMaxHiddenBoxes. Each matrix maps the unit cube centred at
   // the origin to this object's frame.
@@ -216,6 +217,7 @@ export class TesseraScene extends THREE.Object3D {
       display: this.display,
       featureLevel: this.featureLevel,
       framesAtRest: this.framesAtRest,
+      antialiases: this.antialiases,
       // Something else may be visible behind the scene even if it ends no rays.
       endsRays: this.showsBackgroundBlock && this.visibility === Infinity && this.neighbours.behind.length === 0,
       hidden: inScene(this.hidden),

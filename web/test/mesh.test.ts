@@ -72,6 +72,20 @@ describe.skipIf(missing())('a scene of mesh', () => {
     expect(psnr(await picture(along(6)), resting)).toBeGreaterThan(psnr(moving, resting) + 3);
   });
 
+  it('has smooth edges at rest', async () => {
+    const far = view([6, 3, 0.5], [0, 0, 0]);
+    const set = (framesAtRest: number, antialiases: boolean, scale: number) => page.evaluate(([n, smooth, one]) =>
+      Object.assign(headlessPage.city!, { framesAtRest: n, antialiases: smooth, resolutionScale: one }), [framesAtRest, antialiases, scale] as const);
+    await set(24, false, 2);
+    const fine = await picture(far); // the display takes the mean of four samples
+    await set(24, false, 1);
+    const rough = await picture(far);
+    await set(24, true, 1);
+    const smooth = await picture(far);
+    await set(8, true, 1);
+    expect(psnr(smooth, fine)).toBeGreaterThan(psnr(rough, fine) + 2);
+  });
+
   it('shows each camera of several what it shows it alone', async () => {
     const views = [view([-1.05, -2.2, 0.3], [-1, 0, 0.1]), view([1.5, 0.9, 0.6], [3, 2, 0.3])];
     const together = await picture(views);

@@ -39,11 +39,15 @@ void FrameBlend::ensureCapacity(const Camera& camera) {
   }
 }
 
+bool FrameBlend::isResting(const Camera& camera, const Pose& worldFromCamera, bool isChanged) const {
+  return frames_ > 0 && !isChanged && camera == camera_ && worldFromCamera.rotation == worldFromCamera_.rotation &&
+         worldFromCamera.translation == worldFromCamera_.translation;
+}
+
 void FrameBlend::blend(GpuFrame& frame, const Camera& camera, const Pose& worldFromCamera, bool isChanged,
                        uint64_t noise) {
   ensureCapacity(camera);
-  const bool isSame = camera == camera_ && worldFromCamera.rotation == worldFromCamera_.rotation &&
-                      worldFromCamera.translation == worldFromCamera_.translation && !isChanged;
+  const bool isSame = isResting(camera, worldFromCamera, isChanged);
   const bool canReproject = camera.width == camera_.width && camera.height == camera_.height &&
                             isPinhole(camera.lens) && isPinhole(camera_.lens);
   std::swap(histories_[0], histories_[1]);
@@ -71,7 +75,7 @@ void FrameBlend::blend(GpuFrame& frame, const Camera& camera, const Pose& worldF
   blending.largestDeviation = kLargestDeviation;
   frame.run(blend_, blending);
   frame.run(show_, blending);
-  atRest_ = isSame && frames_ > 0 ? atRest_ + 1 : 1;
+  atRest_ = isSame ? atRest_ + 1 : 1;
   ++frames_;
   camera_ = camera;
   worldFromCamera_ = worldFromCamera;

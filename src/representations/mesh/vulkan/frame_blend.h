@@ -13,6 +13,8 @@ class FrameBlend {
   FrameBlend(const FrameBlend&) = delete;
   FrameBlend& operator=(const FrameBlend&) = delete;
 
+  // Whether the view is that of the last frame. `isChanged`: as in blend().
+  bool isResting(const Camera& camera, const Pose& worldFromCamera, bool isChanged) const;
   // Replaces the image of a frame by its blend with those before it. `isChanged`: whether another image is to be
   // expected of the same view, because contents have changed. Reprojects pinhole cameras only; others begin anew.
   // `noise`: address of BlendFramesArguments::noise, or 0.

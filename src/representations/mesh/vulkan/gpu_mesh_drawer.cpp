@@ -90,9 +90,15 @@ class GpuMeshDrawer final : public GpuDrawer {
       blend_.forget();
       return;
     }
+    const bool isResting = blend_.isResting(request.camera, request.worldFromCamera, isChanged);
+    if (settings_.blends && settings_.jitters && isResting) {
+      mesh.jitter[0] = static_cast<float>(radicalInverse(blend_.framesAtRest(), 2) - 0.5);
+      mesh.jitter[1] = static_cast<float>(radicalInverse(blend_.framesAtRest(), 3) - 0.5);
+    }
     drawDithered(frame, mesh);
     if (!settings_.blends) return;
-    blend_.blend(frame, request.camera, request.worldFromCamera, isChanged, settings_.jitters ? 0 : mesh.noise);
+    const bool areAllBlended = settings_.jitters && isResting;
+    blend_.blend(frame, request.camera, request.worldFromCamera, isChanged, areAllBlended ? 0 : mesh.noise);
     wantsAnotherFrame_ = blend_.framesAtRest() < kFramesAtRest;
   }
 
@@ -100,7 +106,6 @@ class GpuMeshDrawer final : public GpuDrawer {
 
  private:
   static constexpr uint32_t kFramesAtRest = 64;  // their mean is shown where nothing moves
-  static constexpr uint32_t kJitters = 8;
 
   void drawExact(GpuFrame& frame, arguments::MeshViewArguments& mesh) {
     const GpuKernel& composite = kernels_.get(kCompositeLayersSpirv, parts_.maxWidth());
@@ -120,11 +125,6 @@ class GpuMeshDrawer final : public GpuDrawer {
     }
     mesh.noise = noise_.address();
     mesh.frame = frameNumber_++;
-    if (settings_.jitters) {
-      const uint32_t index = mesh.frame % kJitters + 1;
-      mesh.jitter[0] = static_cast<float>(radicalInverse(index, 2) - 0.5);
-      mesh.jitter[1] = static_cast<float>(radicalInverse(index, 3) - 0.5);
-    }
     using Spirv = std::span<const uint32_t>;
     const Spirv spirv = settings_.decodesFragments ? Spirv(kDecodeVisibleDecodedSpirv) : Spirv(kDecodeVisibleSpirv);
     const GpuKernel& decode = kernels_.get(spirv, parts_.maxWidth());

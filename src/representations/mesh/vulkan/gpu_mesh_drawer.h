@@ -7,8 +7,8 @@ namespace tessera {
 
 struct GpuMeshSettings {
   // How frames of a sequence are drawn, where the image need not be exact (DrawSettings::exact).
-  bool jitters = false;  // frames show different places within the pixels
-  bool blends = true;    // frames are blended with those before them
+  bool jitters = true;  // frames at rest show different places within the pixels, so that edges are smooth
+  bool blends = true;   // frames are blended with those before them
   // Every fragment is decoded when it is drawn, as in the paper, instead of once per pixel what is visible in it.
   bool decodesFragments = false;
   // The number of fragments for which exact images have memory; 0: an eighth of the GPU's memory. Images with more are

@@ -19,7 +19,7 @@ import { PartNumbers } from './part-numbers';
 import { decodeShader, kBlendShader, kCopyShader, kSkyShader, passMaterial } from './passes';
 import { makeChunks, selectRuns, visibleHalfSpaces, type PatchChunk } from './patch-chunks';
 import { bytesOfIndices, drawRange, patchGeometry } from './patch-geometry';
-import { distanceToBox, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
+import { distanceToBox, jittered, frameJitter, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
 import { rasterMaterial, type RasterKind } from './raster-program';
 
 const kWeightInMotion = 0.6; // of a frame; docs/benchmarks.md says why
@@ -83,7 +83,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     const [featuresFirst, featuresSecond, visible] = dithered.textures;
     this.uniforms = {
       ...this.view,
-      part: { value: new THREE.Vector4() }, origin: { value: new THREE.Matrix3() }, ray: { value: new THREE.Matrix3() },
+      part: { value: new THREE.Vector4() }, jitter: { value: new THREE.Vector2() }, origin: { value: new THREE.Matrix3() }, ray: { value: new THREE.Matrix3() },
       clipFromReference: { value: new THREE.Matrix4() }, depthRow: { value: new THREE.Vector4() }, wRow: { value: new THREE.Vector4() },
       sceneNear: { value: scene.near }, visibility: { value: kFarAway },
       sceneLow: { value: new THREE.Vector3() }, sceneHigh: { value: new THREE.Vector3() },
@@ -199,6 +199,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.framesAtRest = isResting ? this.framesAtRest + 1 : 0;
     this.uniforms.frame.value = isResting ? this.framesAtRest - 1 : this.framesInMotion++;
     this.uniforms.isResting.value = isResting;
+    this.uniforms.jitter.value = isResting && settings.antialiases ? frameJitter(this.framesAtRest - 1) : new THREE.Vector2();
     this.uniforms.weight.value = isResting ? 1 / this.framesAtRest : kWeightInMotion;
     drawIntoTargets(this.renderer, pictures, () => {
       pictures.forEach((picture, i) => this.drawOne(picture, contents[i], settings, i, isResting));
@@ -249,7 +250,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     const { solid, dithered, decoded, output } = this.targets;
     const point = this.place(picture, frontToBack, settings);
     const isLayers = settings.display === 'layers';
-    this.drawTriangles(picture, frontToBack, 'solid', solid, point);
+    if (!isResting) this.drawTriangles(picture, frontToBack, 'solid', solid, point); // at rest it would be the same again
     if (!isLayers) this.drawTriangles(picture, frontToBack, 'dithered', dithered, point);
     decoded.viewport.copy(picture.part);
     this.renderer.setRenderTarget(decoded);
@@ -283,7 +284,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     uniforms.part.value = picture.part;
     uniforms.origin.value = relativeOrigin(point, picture.origin);
     uniforms.ray.value = picture.ray;
-    uniforms.clipFromReference.value = rasterProjection(picture, clip, Math.max(near, nearest));
+    uniforms.clipFromReference.value = jittered(rasterProjection(picture, clip, Math.max(near, nearest)), uniforms.jitter.value, picture);
     uniforms.depthRow.value = matrixRow(clip, 2);
     uniforms.wRow.value = matrixRow(clip, 3);
     uniforms.sceneLow.value.set(...box.low).sub(point);

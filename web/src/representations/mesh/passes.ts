@@ -19,9 +19,10 @@ precision highp int;
 precision highp sampler2D;
 precision highp usampler2D;
 uniform vec4 part;
+uniform vec2 jitter;
 uniform mat3 origin, ray;
-vec2 ndcOfPixel() {
-  return 2.0 * (gl_FragCoord.xy - part.xy) / part.zw - 1.0;
+vec2 pixelNdc() {
+  return 2.0 * (gl_FragCoord.xy + jitter - part.xy) / part.zw - 1.0;
 }
 `;
 
@@ -41,7 +42,7 @@ void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   if (texelFetch(visible, at, 0).x != 0u) discard;
   if (texelFetch(opaqueDepth, min(at, textureSize(opaqueDepth, 0) - 1), 0).r < 1.0) discard;
-  vec3 d = ray * vec3(ndcOfPixel(), 1.0), size = abs(d);
+  vec3 d = ray * vec3(pixelNdc(), 1.0), size = abs(d);
   int a = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   float along = d[a];
   int side = 2 * a + (along < 0.0 ? 1 : 0);
@@ -78,7 +79,7 @@ void main() {
   if (int(ofBlock.a) != ${shape}) discard;
   vec4 first = texelFetch(featuresFirst, at, 0), second = texelFetch(featuresSecond, at, 0);
   vec4 f0 = partVector(number, 0) + partVector(number, 2) * first, f1 = partVector(number, 1) + partVector(number, 3) * second;
-  vec3 d = normalize(ray * vec3(ndcOfPixel(), 1.0));
+  vec3 d = normalize(ray * vec3(pixelNdc(), 1.0));
   vec3 seen;
   if (display == kShowFeatures || display == kShowTriangles || display == kShowAlpha) {
     seen = first.rgb;
@@ -149,7 +150,7 @@ void main() {
         squares += colour * colour;
       }
     }
-    vec2 ndc = ndcOfPixel();
+    vec2 ndc = pixelNdc();
     vec3 d = normalize(ray * vec3(ndc, 1.0));
     // The sky is infinitely far away.
     vec4 place = seen.x == 0u ? vec4(d, 0.0) : vec4(origin * vec3(ndc, 1.0) + uintBitsToFloat(seen.y) * d, 1.0);

@@ -24,6 +24,27 @@ export function relativeOrigin(point: THREE.Vector3, origin: THREE.Matrix3): THR
   return moved;
 }
 
+// Returns the offset of the places that pixels show in a frame, in pixels: from -½ to ½ (Halton's sequence).
+export function frameJitter(frame: number): THREE.Vector2 {
+  const inverse = (base: number) => {
+    let [sum, digit] = [0, 1];
+    for (let rest = frame + 1; rest > 0; rest = Math.floor(rest / base)) sum += (digit /= base) * (rest % base);
+    return sum;
+  };
+  return new THREE.Vector2(inverse(2) - 0.5, inverse(3) - 0.5);
+}
+
+// Returns the projection of an image whose pixels show places that are `jitter` pixels away.
+export function jittered(projection: THREE.Matrix4, jitter: THREE.Vector2, { part }: Pick<Picture, 'part'>): THREE.Matrix4 {
+  const moved = projection.clone();
+  const { elements } = moved;
+  for (let column = 0; column < 16; column += 4) {
+    elements[column] -= ((2 * jitter.x) / part.z) * elements[column + 3];
+    elements[column + 1] -= ((2 * jitter.y) / part.w) * elements[column + 3];
+  }
+  return moved;
+}
+
 // Returns the projection for places relative to the point, with a near plane of its own (the user's might cut parts of
 // the scene off) and the far plane at infinity. `nearest` is the distance of the nearest place, scene units.
 export function rasterProjection(picture: Picture, clip: THREE.Matrix4, nearest: number): THREE.Matrix4 {

@@ -49,6 +49,7 @@ uniform vec3 patchLayout;  // texels along an edge of a patch, patches in a row,
 uniform uint layers;  // number of the first triangle's layer (ditherThreshold)
 uniform sampler2D opaqueDepth;
 uniform vec4 part;
+uniform vec2 jitter;  // of the places that pixels show, in pixels
 uniform mat3 origin, ray;
 uniform vec4 depthRow, wRow;  // of the camera's projection
 uniform float sceneNear, visibility;
@@ -78,7 +79,7 @@ bool isHidden(vec3 x) {
 }
 
 void main() {
-  vec2 ndc = 2.0 * (gl_FragCoord.xy - part.xy) / part.zw - 1.0;
+  vec2 ndc = 2.0 * (gl_FragCoord.xy + jitter - part.xy) / part.zw - 1.0;
   vec3 o = origin * vec3(ndc, 1.0), d = normalize(ray * vec3(ndc, 1.0));
   float distance = dot(fromReference - o, d);
   if (!(distance > (isBackground ? behindBox(o, d) : sceneNear) && distance < kSceneEnd)) discard;
