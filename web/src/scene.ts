@@ -32,6 +32,8 @@ import { decodeTileset } from './tiles/decode-tileset';
 import type { Tileset } from './tiles/tileset';
 
 const kTilesetBytes = 1 << 24;
+const kUsualBytesPerPixel = 29; // until there is a drawer
+const kDepthBytesPerPixel = 8;
 const kNearby = 1e-6; // scene units
 const kPrefetchTime = 30; // ms for uploads per call of `prefetch`, which draws nothing
 
@@ -95,6 +97,8 @@ export class TesseraScene extends THREE.Object3D {
   private streamer?: Streamer;
   private mesh?: ReturnType<typeof cityMesh>;
   private drawn: number[] = [];
+  private shown = ''; // differs when the scene's own depth may, for the same cameras
+  private lastBehind = ''; // `shown` of the scenes behind this one
   private lastUpdate = 0;
   private disposed = false;
   private refused = false; // the GPU cannot draw it
@@ -179,6 +183,11 @@ export class TesseraScene extends THREE.Object3D {
     return { ...this.streamer.statistics, targetBytes: this.drawer.bytes + this.opaque.bytes, drawn: this.drawn };
   }
 
+  // GPU memory of the scene's render targets, and of the depth of opaque objects.
+  get bytesPerPixel(): number {
+    return (this.drawer?.bytesPerPixel ?? kUsualBytesPerPixel) + kDepthBytesPerPixel;
+  }
+
   // Streams and draws the scene for a camera. An ArrayCamera, or a headset that presents, gets one view per camera;
   // tiles are requested for all views together.
   update(camera: THREE.Camera, renderer: THREE.WebGLRenderer): void {
@@ -210,7 +219,12 @@ export class TesseraScene extends THREE.Object3D {
     // In scenes whose rays always end, rays that hit nothing take the background block's colour, or else the coarsest
     // content's. It is always resident, so the colour does not depend on the view.
     const backgroundContent = behind ?? streamer.findResident(coarsestTiles(this.tree)[0]);
-    const hasOpaqueDepthChanged = this.opaque.hasChanged || this.neighbours.behind.some(({ loaded }) => !loaded);
+    const behindThis = JSON.stringify(this.neighbours.behind.map(({ shown }) => shown));
+    const hasOpaqueDepthChanged = this.opaque.hasChanged || behindThis !== this.lastBehind;
+    this.lastBehind = behindThis;
+    this.shown = JSON.stringify([
+      [...contentByTile], this.hidden, this.visibility, this.minTransmittance, behind !== undefined, behindThis,
+    ]);
     mesh.visible = drawer.draw({ pictures, worldFromScene, contents, opaqueDepth: depth, hasOpaqueDepthChanged, backgroundContent }, {
       minTransmittance: this.minTransmittance,
       visibility: Math.min(Math.max(this.visibility * diagonal, kNearby), kFarAway),

@@ -23,7 +23,6 @@ export interface Mover {
 }
 
 const kVisibility = 1; // as a multiple of the diagonal of the captured region
-const kBytesPerPixel = 37; // of a scene's render targets and of the depth of the opaque objects
 
 export class Viewer {
   readonly world = new THREE.Scene();
@@ -132,7 +131,8 @@ export class Viewer {
   // Each scene has its own render targets; together they take at most half of the GPU budget.
   private get maxScale(): number {
     const { x, y } = this.renderer.getDrawingBufferSize(new THREE.Vector2());
-    return Math.min(1, Math.sqrt((0.5 * this.gpuBudget) / (kBytesPerPixel * x * y * Math.max(1, this.visibleScenes.length))));
+    const bytesPerPixel = this.visibleScenes.reduce((sum, scene) => sum + scene.bytesPerPixel, 0);
+    return Math.min(1, Math.sqrt((0.5 * this.gpuBudget) / Math.max(1, bytesPerPixel * x * y)));
   }
 
   // Distributes the budget to the scenes, which share the GPU, the page and the network.

@@ -40,7 +40,7 @@ function makeTarget({ pictures, holdsSums }: TargetForm, { type, floatDistances,
   return { target, distancesOfBytes: isBytes, morePictures, bytesPerPixel: (isBytes ? 4 : 8) * count + (floatDistances ? 8 : 0) };
 }
 
-function isComplete(renderer: THREE.WebGLRenderer, target: THREE.WebGLRenderTarget): boolean {
+export function isComplete(renderer: THREE.WebGLRenderer, target: THREE.WebGLRenderTarget): boolean {
   const gl = renderer.getContext();
   const before = renderer.getRenderTarget();
   renderer.setRenderTarget(target);
@@ -72,5 +72,9 @@ export function contentTarget(renderer: THREE.WebGLRenderer, form: TargetForm): 
       candidate.target.dispose();
     }
   }
-  throw new SceneError('GPU', '', `cannot render into the images that scenes of ${representation} need`, remedy);
+  throw cannotRender(representation);
+}
+
+export function cannotRender(representation: string): SceneError {
+  return new SceneError('GPU', '', `cannot render into the images that scenes of ${representation} need`, 'draw it on another machine');
 }

@@ -4,11 +4,14 @@ import { SceneError } from '../scene-error';
 
 export const kMaxHiddenBoxes = 8; // boxes set by the user, and as many again in the background block alone
 
-// Returns the boxes that hide something (DrawSettings): `all` of the background block, of which the first
-// `ofAllContents` also hide the other contents. Throws SceneError if there are too many.
-export function selectHiddenBoxes(
-  boxes: readonly THREE.Matrix4[], ofBackgroundBlock: readonly THREE.Matrix4[],
-): { all: THREE.Matrix4[]; ofAllContents: number } {
+// Those in which nothing of the background block is drawn; of the first ones nothing of the other contents either.
+export interface HiddenBoxes {
+  all: THREE.Matrix4[];
+  ofAllContents: number;
+}
+
+// Returns the boxes that hide something (DrawSettings). Throws SceneError if there are too many.
+export function selectHiddenBoxes(boxes: readonly THREE.Matrix4[], ofBackgroundBlock: readonly THREE.Matrix4[]): HiddenBoxes {
   if (boxes.length > kMaxHiddenBoxes) {
     throw new SceneError('scene', 'hidden', `contains ${boxes.length} boxes; at most ${kMaxHiddenBoxes} are supported`, 'hide fewer, larger ones');
   }

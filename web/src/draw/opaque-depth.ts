@@ -10,10 +10,28 @@ export function farthestDepth(): THREE.DataTexture {
   return texture;
 }
 
+// Returns numbers that change with the depth of an object. NaN, which equals nothing, stands for what cannot be known:
+// shaders of the user may move vertices. `isSurface`: the object is a scene of ours, whose depth others look after.
+function describeObject(object: THREE.Object3D, isSurface: boolean): number[] {
+  const { id, matrixWorld: { elements } } = object;
+  const state = [id, ...elements];
+  if (isSurface) return state;
+  const mesh = object as THREE.SkinnedMesh & Partial<Pick<THREE.InstancedMesh, 'instanceMatrix' | 'count'>>;
+  state.push(...(mesh.morphTargetInfluences ?? []), mesh.instanceMatrix?.version ?? 0, mesh.count ?? 0);
+  for (const bone of mesh.skeleton?.bones ?? []) state.push(...bone.matrixWorld.elements);
+  for (const { version } of Object.values(mesh.geometry?.attributes ?? {}) as THREE.BufferAttribute[]) state.push(version ?? 0);
+  for (const material of [mesh.material].flat()) {
+    const { version, visible, transparent, depthWrite, alphaTest } = material;
+    state.push(material.id, version, Number(visible), Number(transparent), Number(depthWrite), alphaTest);
+    if (material instanceof THREE.ShaderMaterial) state.push(NaN);
+  }
+  return state;
+}
+
 export class OpaqueDepth {
-  hasChanged = false; // whether anything in the world has moved, appeared or disappeared since the last call of `draw`
+  hasChanged = false; // whether the depth may be another one than that of the last call of `draw` for the same cameras
   private target?: THREE.WebGLRenderTarget;
-  private lastPlaces: number[] = [];
+  private lastState: number[] = [];
 
   get bytes(): number {
     // Colour and depth take 4 bytes each.
@@ -31,24 +49,22 @@ export class OpaqueDepth {
     const seeThrough = new Set<THREE.Material>();
     const layers = new THREE.Layers();
     layers.mask = pictures.reduce((mask, { camera }) => mask | camera.layers.mask, 0);
-    const seen: THREE.Object3D[] = [];
-    let hasOpaque = false;
+    const ends = new Set<THREE.Object3D>(); // objects that end rays
     const look = (object: THREE.Object3D) => {
       if (!object.visible) return; // children are invisible too
-      seen.push(object);
       const { material } = object as THREE.Mesh;
       if (material !== undefined && object.layers.test(layers)) {
         for (const one of Array.isArray(material) ? material : [material]) {
           if (!one.visible) continue;
           // Materials that are transparent or write no depth end no rays; other materials of the same object may.
           if (!surfaces.has(object) && (one.transparent || !one.depthWrite)) seeThrough.add(one);
-          else hasOpaque = true;
+          else ends.add(object);
         }
       }
       for (const child of object.children) look(child);
     };
     look(world);
-    if (!hasOpaque) {
+    if (ends.size === 0) {
       this.hasChanged = this.target !== undefined;
       this.dispose();
       return null;
@@ -77,10 +93,9 @@ export class OpaqueDepth {
     Object.assign(renderer.shadowMap, { autoUpdate, needsUpdate });
     if (background) (world as THREE.Scene).background = background;
     for (const material of seeThrough) material.visible = true;
-    // Joints of animated models are objects, too. Rendering has updated the matrices.
-    const places = seen.flatMap(({ id, matrixWorld: { elements } }) => [id, ...elements]);
-    this.hasChanged = places.length !== this.lastPlaces.length || places.some((x, i) => x !== this.lastPlaces[i]);
-    this.lastPlaces = places;
+    const state = [...ends].flatMap((object) => describeObject(object, surfaces.has(object))); // rendering has updated the matrices
+    this.hasChanged = state.length !== this.lastState.length || state.some((x, i) => x !== this.lastState[i]);
+    this.lastState = state;
     return target.depthTexture;
   }
 

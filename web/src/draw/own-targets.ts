@@ -10,8 +10,11 @@ export function drawIntoTargets(renderer: THREE.WebGLRenderer, pictures: Pick<Pi
   const clearAlpha = renderer.getClearAlpha();
   renderer.setClearColor(0, 0);
   renderer.autoClear = false;
-  drawAsTheyStand(renderer, pictures, draw);
-  renderer.autoClear = autoClear;
-  renderer.setClearColor(clearColour, clearAlpha);
-  renderer.setRenderTarget(before);
+  try {
+    drawAsTheyStand(renderer, pictures, draw);
+  } finally {
+    renderer.autoClear = autoClear;
+    renderer.setClearColor(clearColour, clearAlpha);
+    renderer.setRenderTarget(before);
+  }
 }

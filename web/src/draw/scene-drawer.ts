@@ -68,6 +68,7 @@ export interface SceneDrawer<
   Header extends ContentHeader = ContentHeader, Decoded extends Content = Content, Drawn extends DrawnContent = DrawnContent,
 > extends DrawnPicture {
   readonly bytes: number; // GPU memory without contents
+  readonly bytesPerPixel: number; // of its targets
   readonly featureLevels: number; // largest number of fine levels of the contents prepared so far; 0 if there are none
 
   // Returns the GPU bytes of a content once it is resident, without resources.

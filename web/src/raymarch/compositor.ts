@@ -50,7 +50,7 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
   pictures: Picture[] = []; // the pictures in the target
   readonly distancesOfBytes: boolean;
   private readonly modes: readonly ShownMode[];
-  private readonly bytesPerPixel: number; // of all targets
+  private readonly bytesOfContents: number; // of a pixel
   // Shares the depth of `target`, so that the colours of `target` can be read at the same time.
   private readonly depthAlone: THREE.WebGLRenderTarget;
   private readonly hiding = new THREE.Scene();
@@ -68,7 +68,7 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     const output = contentTarget(renderer, method.target(scene.levels));
     this.target = output.target;
     this.distancesOfBytes = output.distancesOfBytes;
-    this.bytesPerPixel = output.bytesPerPixel;
+    this.bytesOfContents = output.bytesPerPixel;
     this.modes = method.modes;
     this.depthAlone = new THREE.WebGLRenderTarget(1, 1, {
       generateMipmaps: false, depthBuffer: true, depthTexture: output.target.depthTexture, format: THREE.RedFormat,
@@ -146,10 +146,13 @@ export class Compositor<Header extends MarchedHeader, Decoded extends MarchedCon
     this.marching.release?.(own);
   }
 
+  get bytesPerPixel(): number {
+    return this.bytesOfContents + 4 + 1 + (this.marching.lastPass?.bytesPerPixel ?? 0);
+  }
+
   get bytes(): number {
     const pixels = this.target.width * this.target.height;
-    const lastPass = this.marching.lastPass?.bytes ?? 0;
-    return (this.bytesPerPixel + 4 + 1) * pixels + lastPass + bytesOfGeometry(this.cube) + bytesOfGeometry(this.screen) + 4;
+    return this.bytesPerPixel * pixels + bytesOfGeometry(this.cube) + bytesOfGeometry(this.screen) + 4;
   }
 
   resize({ x, y }: THREE.Vector2): void {

@@ -19,7 +19,7 @@ export const kNothingOwn: MarchedOwn = { uniforms: {}, meshes: [], hasLearnedBac
 // A final pass that converts the sums of all contents to colours.
 export interface LastPass {
   readonly target: THREE.WebGLRenderTarget; // receives the colours
-  readonly bytes: number; // GPU memory
+  readonly bytesPerPixel: number;
   resize(width: number, height: number): void;
   dispose(): void;
 }

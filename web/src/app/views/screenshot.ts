@@ -48,8 +48,10 @@ export function takePicture(
         renderer.setSize(wide, high, false);
         do {
           await allTiles(viewer, signal, (pending) => tell({ piece, pieces: pieces.length, pending }));
-          viewer.draw();
-          signal.throwIfAborted();
+          for (viewer.draw(); viewer.loaded && !viewer.idle; viewer.draw()) {
+            await new Promise((resolve) => setTimeout(resolve));
+            signal.throwIfAborted();
+          }
         } while (!viewer.idle); // drawing takes GPU memory itself, which may evict tiles; frames of some scenes are blended
         context.drawImage(renderer.domElement, left, top);
       }

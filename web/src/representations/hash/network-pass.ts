@@ -119,9 +119,7 @@ export class NetworkPass {
     private readonly weightTargets: number,
   ) {}
 
-  get bytes(): number {
-    return 8 * this.target.width * this.target.height;
-  }
+  readonly bytesPerPixel = 8;
 
   // Returns the network with these numbers, creating it if necessary. A scene has one network per level of detail.
   getDrawnNetwork(network: DenseLayer[]): DrawnNetwork {

@@ -4,6 +4,7 @@ import type { ContentCodec, ContentHeader, DeclaredContent } from '../../tiles/c
 import { kContentLimits, type ContentLimits } from '../../tiles/content-limits';
 import { bufferViewBytes, ContentReader } from '../../tiles/content-reader';
 import { getArray, getBoolean, getField, getInteger, getNumber, getNumbers, numberFrom, type Json } from '../../tiles/json-fields';
+import { networkVectors } from '../../tiles/network';
 import type { SharedResource, Vec3 } from '../../tiles/tileset';
 import { decodeTexture, kBc4Bytes, kBc5Bytes } from './block-compression';
 import { kCornerNumbers, kFeatures, textureSize, type MeshContent, type MeshPart, type MeshTexels } from './mesh-content';
@@ -70,6 +71,8 @@ class MeshReader extends ContentReader {
       if (memoryBytes > this.limits.bytes) this.fail(`takes more than ${this.limits.bytes} bytes of memory`);
       return part;
     });
+    const vectors = parts.reduce((sum, { network }) => sum + networkVectors(network), 0);
+    if (vectors > rules.kMaxVectors) this.fail('the networks of its parts are too large together', 'train with smaller networks');
     return { memoryBytes, parts, isCompressed, skyEdge, sky, sources, views, declared };
   }
 

@@ -2,7 +2,7 @@
 // Half-transparent triangles are dithered, and frames are blended. See web/README.md.
 import * as THREE from 'three';
 import { colourOfBlock, colourOfLevel } from '../../draw/display-modes';
-import { selectHiddenBoxes, kMaxHiddenBoxes } from '../../draw/hidden-boxes';
+import { kMaxHiddenBoxes, selectHiddenBoxes, type HiddenBoxes } from '../../draw/hidden-boxes';
 import { farthestDepth } from '../../draw/opaque-depth';
 import { drawIntoTargets } from '../../draw/own-targets';
 import { isParallel, type Picture } from '../../draw/picture';
@@ -19,11 +19,12 @@ import { PartNumbers } from './part-numbers';
 import { decodeShader, kBlendShader, kCopyShader, kSkyShader, passMaterial } from './passes';
 import { makeChunks, selectRuns, visibleHalfSpaces, type PatchChunk } from './patch-chunks';
 import { bytesOfIndices, drawRange, patchGeometry } from './patch-geometry';
-import { distanceToBox, jittered, frameJitter, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
+import { distanceToBox, distanceToSides, jittered, frameJitter, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
 import { rasterMaterial, type RasterKind } from './raster-program';
 
 const kWeightInMotion = 0.6; // of a frame; docs/benchmarks.md says why
 const kDepthSteps = 4; // between the depths of equal triangles
+const kDepthOrders = 4; // parts that may have equal triangles are few, and offsets must not exceed distances of surfaces
 const kCosineOfCut = 0.96; // a camera that turns by more than 16° between frames has jumped
 const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 
@@ -33,6 +34,7 @@ type TriangleMesh = THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
 interface DrawnMeshPart {
   part: MeshPart;
   row: number; // in the texture of numbers
+  shape: number; // of its network
   geometry: THREE.BufferGeometry;
   chunks: PatchChunk[];
   uniforms: Uniforms;
@@ -99,7 +101,10 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.passes = {
       sky: this.makePass(kSkyShader), blend: this.makePass(kBlendShader), copy: this.makePass(kCopyShader),
     };
-    if (this.distancesOfBytes) this.passes.blend.material.defines.DISTANCES_OF_BYTES = '';
+    const { defines } = this.passes.blend.material;
+    if (this.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
+    else if (this.distance.type === THREE.HalfFloatType) defines.DISTANCES_OF_HALF_FLOATS = '';
+    for (const pass of Object.values(this.passes)) renderer.compile(pass, this.anyCamera);
     this.triangles.matrixWorldAutoUpdate = false;
   }
 
@@ -113,6 +118,10 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
 
   get distancesOfBytes(): boolean {
     return this.targets.output.distancesOfBytes;
+  }
+
+  get bytesPerPixel(): number {
+    return this.targets.bytesPerPixel;
   }
 
   get bytes(): number {
@@ -136,8 +145,9 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   allocate(content: MeshContent, { box, backgroundBlock, number, level }: ContentPlace): DrawnMesh {
     const { isCompressed } = content;
     const textures = new MeshTextures(content);
-    const parts = content.parts.map((part, n): DrawnMeshPart => {
-      const row = this.numbers.add(part, colourOfBlock(number), colourOfLevel(level));
+    const parts = content.parts.flatMap((part, n): DrawnMeshPart[] => {
+      if (part.patches === 0) return [];
+      const { row, shape } = this.numbers.add(part, colourOfBlock(number), colourOfLevel(level));
       const { features, opacity } = textures.parts[n];
       const uniforms = {
         ...this.uniforms,
@@ -151,10 +161,12 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       };
       const { vertices } = content.texels[n];
       const geometry = patchGeometry(part, vertices);
-      return { part, row, geometry, chunks: makeChunks(vertices), uniforms, meshes: {} };
+      return [{ part, row, shape, geometry, chunks: makeChunks(vertices), uniforms, meshes: {} }];
     });
     this.numbers.shapes.slice(this.decoders.length).forEach((network) => {
-      this.decoders.push(this.makePass(decodeShader(this.decoders.length, network)));
+      const decoder = this.makePass(decodeShader(this.decoders.length, network));
+      this.decoders.push(decoder);
+      this.renderer.compile(decoder, this.anyCamera);
     });
     return { id: ++this.lastId, box, isBackground: backgroundBlock, isCompressed, textures, parts };
   }
@@ -188,8 +200,9 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       contents.map((parts) => parts.map(({ content: { id }, within }) => [id, within])), settings, opaqueDepth !== null,
     ]);
     const isResting = this.last?.key === key && !hasOpaqueDepthChanged;
-    if (isResting && this.framesAtRest >= settings.framesAtRest) return this.last!.isDrawn;
     this.pictures = pictures;
+    if (isResting && this.framesAtRest >= settings.framesAtRest) return this.last!.isDrawn;
+    const hidden = selectHiddenBoxes(settings.hidden, settings.hiddenOfBackgroundBlock);
     this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
     this.view.display.value = kMeshModes.findIndex(({ name }) => name === settings.display);
     this.uniforms.visibility.value = settings.visibility;
@@ -202,7 +215,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.uniforms.jitter.value = isResting && settings.antialiases ? frameJitter(this.framesAtRest - 1) : new THREE.Vector2();
     this.uniforms.weight.value = isResting ? 1 / this.framesAtRest : kWeightInMotion;
     drawIntoTargets(this.renderer, pictures, () => {
-      pictures.forEach((picture, i) => this.drawOne(picture, contents[i], settings, i, isResting));
+      pictures.forEach((picture, i) => this.drawOne(picture, contents[i], settings, hidden, i, isResting));
       this.run(this.passes.copy, this.targets.history, pictures);
     });
     const isDrawn = contents.some((ofOne) => ofOne.length > 0);
@@ -246,9 +259,9 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.pass.children = [];
   }
 
-  private drawOne(picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], settings: DrawSettings, number: number, isResting: boolean): void {
+  private drawOne(picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], settings: DrawSettings, hidden: HiddenBoxes, number: number, isResting: boolean): void {
     const { solid, dithered, decoded, output } = this.targets;
-    const point = this.place(picture, frontToBack, settings);
+    const point = this.place(picture, frontToBack, hidden);
     const isLayers = settings.display === 'layers';
     if (!isResting) this.drawTriangles(picture, frontToBack, 'solid', solid, point); // at rest it would be the same again
     if (!isLayers) this.drawTriangles(picture, frontToBack, 'dithered', dithered, point);
@@ -259,11 +272,12 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       for (const isBackground of [true, false]) this.renderTriangles(picture, frontToBack, 'layers', isBackground, point);
     } else {
       const sky = frontToBack.map(({ content }) => content.textures.sky).find((one) => one !== undefined);
-      if (sky && settings.visibility >= kFarAway && settings.display !== 'triangles' && settings.display !== 'alpha') {
+      if (sky && settings.endsRays && settings.display !== 'triangles' && settings.display !== 'alpha') {
         this.uniforms.sky.value = sky;
         this.run(this.passes.sky, decoded, [picture]);
       }
-      for (const decoder of this.decoders) this.run(decoder, decoded, [picture]);
+      const shapes = new Set(frontToBack.flatMap(({ content }) => content.parts.map(({ shape }) => shape)));
+      for (const shape of shapes) this.run(this.decoders[shape], decoded, [picture]);
     }
     const before = this.last?.pictures[number];
     const hasHistory = before !== undefined && before.forward.dot(viewDirection(picture)) > kCosineOfCut;
@@ -276,25 +290,31 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   }
 
   // Sets the uniforms of a picture, and returns its reference point.
-  private place(picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], { hidden, hiddenOfBackgroundBlock }: DrawSettings): THREE.Vector3 {
-    const { uniforms, scene: { box, near } } = this;
+  private place(picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], { all, ofAllContents }: HiddenBoxes): THREE.Vector3 {
+    const { uniforms, scene: { box } } = this;
     const point = referencePoint(picture);
     const clip = relativeTo(point, picture.clipFromScene);
-    const nearest = Math.min(kFarAway, ...frontToBack.map(({ content }) => distanceToBox(content.box, picture.eye)));
     uniforms.part.value = picture.part;
     uniforms.origin.value = relativeOrigin(point, picture.origin);
     uniforms.ray.value = picture.ray;
-    uniforms.clipFromReference.value = jittered(rasterProjection(picture, clip, Math.max(near, nearest)), uniforms.jitter.value, picture);
     uniforms.depthRow.value = matrixRow(clip, 2);
     uniforms.wRow.value = matrixRow(clip, 3);
     uniforms.sceneLow.value.set(...box.low).sub(point);
     uniforms.sceneHigh.value.set(...box.high).sub(point);
-    const { all, ofAllContents } = selectHiddenBoxes(hidden, hiddenOfBackgroundBlock);
     all.forEach((one, n) => (uniforms.boxFromReference.value[n] = relativeTo(point, one.clone().invert())));
     for (const { content: { parts, isBackground } } of frontToBack) {
       for (const part of parts) part.uniforms.hiddenBoxes.value = isBackground ? all.length : ofAllContents;
     }
     return point;
+  }
+
+  // Returns the projection of the triangles of the background block, or of those of tiles: each with its own near plane,
+  // as depth is the more precise the farther away that is.
+  private project(picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], isBackground: boolean, point: THREE.Vector3): THREE.Matrix4 {
+    const boxes = frontToBack.filter(({ content }) => content.isBackground === isBackground).map(({ content }) => content.box);
+    const nearest = isBackground ? distanceToSides(this.scene.box, picture.eye) : Math.min(kFarAway, ...boxes.map((box) => distanceToBox(box, picture.eye)));
+    const projection = rasterProjection(picture, relativeTo(point, picture.clipFromScene), Math.max(this.scene.near, nearest), boxes);
+    return jittered(projection, this.uniforms.jitter.value, picture);
   }
 
   // Draws the background block, and the other contents in front of it.
@@ -311,17 +331,17 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   }
 
   private renderTriangles(
-    { camera }: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, isBackground: boolean, point: THREE.Vector3,
+    picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, isBackground: boolean, point: THREE.Vector3,
   ): void {
     const meshes: TriangleMesh[] = [];
-    const halfSpaces = visibleHalfSpaces(this.uniforms.clipFromReference.value, isParallel(camera));
+    this.uniforms.clipFromReference.value = this.project(picture, frontToBack, isBackground, point);
+    const halfSpaces = visibleHalfSpaces(this.uniforms.clipFromReference.value, isParallel(picture.camera));
     const times = new Map<DrawnMeshPart, number>(); // a part may be drawn in several runs, and in place of several tiles
     for (const { content, within = kEverywhere } of frontToBack) {
       if (content.isBackground !== isBackground) continue;
       const low = new THREE.Vector3(...within.low).sub(point);
       const high = new THREE.Vector3(...within.high).sub(point);
       for (const [order, drawn] of content.parts.entries()) {
-        if (drawn.part.patches === 0) continue;
         drawn.uniforms.partOrigin.value.set(...drawn.part.origin).sub(point);
         const limits = { low: low.toArray(), high: high.toArray() };
         for (const run of selectRuns(drawn.chunks, drawn.part, drawn.uniforms.partOrigin.value, halfSpaces, limits)) {
@@ -342,7 +362,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     }
     if (meshes.length === 0) return;
     this.triangles.children = meshes;
-    this.renderer.render(this.triangles, camera);
+    this.renderer.render(this.triangles, picture.camera);
     this.triangles.children = [];
   }
 
@@ -354,7 +374,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     material.uniforms = uniforms;
     // Of equal triangles, that of the first part is in front, as depths differ by rounding.
     material.polygonOffset = order > 0;
-    material.polygonOffsetUnits = kDepthSteps * order;
+    material.polygonOffsetUnits = kDepthSteps * (order % kDepthOrders);
     const mesh = new THREE.Mesh(geometry, material);
     mesh.frustumCulled = false;
     mesh.matrixAutoUpdate = mesh.matrixWorldAutoUpdate = false;

@@ -9,6 +9,7 @@ export const kMinPatchEdge = 8;
 export const kMaxPatchEdge = 32;
 export const kMaxTextureEdge = 4096;
 export const kMaxSkyEdge = 1024;
+export const kMaxVectors = 2 ** 18; // of four numbers, of the networks of a content
 const kHarmonics = 9; // of the direction
 const kFarthestVertex = 1e7; // scene units
 const kLargestStep = 152;

@@ -1,6 +1,6 @@
 // The images of a `mesh` scene on their way to the screen.
 import * as THREE from 'three';
-import { contentTarget, type ContentTarget } from '../../draw/content-target';
+import { cannotRender, contentTarget, isComplete, type ContentTarget } from '../../draw/content-target';
 
 // How the targets are named: `visible` holds numbers of parts with bits of distances, after two images of features.
 export class MeshTargets {
@@ -10,6 +10,7 @@ export class MeshTargets {
   readonly decoded: THREE.WebGLRenderTarget;
   readonly history: THREE.WebGLRenderTarget;
 
+  // Throws SceneError if the GPU cannot render into such images.
   constructor(renderer: THREE.WebGLRenderer) {
     this.output = contentTarget(renderer, { representation: 'mesh', pictures: 2, morePictures: 0, holdsSums: false });
     const { depthTexture } = this.output.target; // the passes that write `output` need none
@@ -23,13 +24,18 @@ export class MeshTargets {
     }
     this.decoded = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthBuffer: false });
     this.history = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthBuffer: false, type: this.output.target.texture.type });
+    if (this.all.every((target) => isComplete(renderer, target))) return;
+    this.dispose();
+    throw cannotRender('mesh');
+  }
+
+  get bytesPerPixel(): number {
+    // Of solid, dithered and decoded, of the history, and of the depth.
+    return 8 + 16 + 4 + (this.output.distancesOfBytes ? 4 : 8) + 4 + this.output.bytesPerPixel;
   }
 
   get bytes(): number {
-    const { width, height } = this.decoded;
-    // Of solid, dithered and decoded, of the history, and of the depth.
-    const ofPixel = 8 + 16 + 4 + (this.output.distancesOfBytes ? 4 : 8) + 4;
-    return width * height * (ofPixel + this.output.bytesPerPixel);
+    return this.decoded.width * this.decoded.height * this.bytesPerPixel;
   }
 
   private get all(): THREE.WebGLRenderTarget[] {

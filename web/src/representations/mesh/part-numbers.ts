@@ -4,7 +4,7 @@ import * as THREE from 'three';
 import { networkVectors, packNetwork, type DenseLayer } from '../../tiles/network';
 import { kFeatures, type MeshPart } from './mesh-content';
 
-const kWidth = 256; // texels
+const kWidth = 2048; // texels, which all GPUs support
 export const kVectorsBeforeNetwork = kFeatures / 2 + 2; // ranges, colour of the block with the shape, colour of the level
 
 export class PartNumbers {
@@ -17,8 +17,8 @@ export class PartNumbers {
     return this.texture.value.image.data!.byteLength;
   }
 
-  // Returns the row of the part, which is also its number, counted from 0.
-  add({ ranges, network }: MeshPart, ofBlock: THREE.Color, ofLevel: THREE.Color): number {
+  // Returns the row of the part, which is also its number, counted from 0, and the shape of its network.
+  add({ ranges, network }: MeshPart, ofBlock: THREE.Color, ofLevel: THREE.Color): { row: number; shape: number } {
     const shape = this.shapeNumber(network);
     const numbers = new Float32Array(4 * (kVectorsBeforeNetwork + networkVectors(network)));
     ranges.forEach(([low, high], f) => {
@@ -40,7 +40,7 @@ export class PartNumbers {
     } else {
       this.write(row, numbers);
     }
-    return row;
+    return { row, shape };
   }
 
   remove(row: number): void {

@@ -166,8 +166,8 @@ void main() {
   float distance = uintBitsToFloat(surface.y);
 #ifdef DISTANCES_OF_BYTES
   distance /= distance + 1.0;
-#else
-  distance = min(distance, 60000.0);  // half floats end at 65504
+#elif defined(DISTANCES_OF_HALF_FLOATS)
+  distance = min(distance, 60000.0);  // they end at 65504
 #endif
   distanceAndOpacity = surface.x == 0u ? vec4(0.0) : vec4(distance, 0.0, 0.0, 1.0);
 }`;

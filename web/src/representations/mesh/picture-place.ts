@@ -46,10 +46,19 @@ export function jittered(projection: THREE.Matrix4, jitter: THREE.Vector2, { par
 }
 
 // Returns the projection for places relative to the point, with a near plane of its own (the user's might cut parts of
-// the scene off) and the far plane at infinity. `nearest` is the distance of the nearest place, scene units.
-export function rasterProjection(picture: Picture, clip: THREE.Matrix4, nearest: number): THREE.Matrix4 {
+// the scene off) and the far plane at infinity, or, of a parallel projection, behind the boxes that are drawn. `nearest`
+// is the distance of the nearest place, scene units.
+export function rasterProjection(picture: Picture, clip: THREE.Matrix4, nearest: number, boxes: readonly Box[]): THREE.Matrix4 {
   const projection = clip.clone();
-  if (isParallel(picture.camera)) return projection;
+  if (isParallel(picture.camera)) {
+    const d = new THREE.Vector3(0, 0, 1).applyMatrix3(picture.ray).normalize();
+    const start = referencePoint(picture).dot(d);
+    const farthest = ({ low, high }: Box) => Math.max(d.x * low[0], d.x * high[0]) + Math.max(d.y * low[1], d.y * high[1]) + Math.max(d.z * low[2], d.z * high[2]);
+    const far = 2 * Math.max(1, ...boxes.map((box) => farthest(box) - start));
+    const { elements } = projection;
+    [elements[2], elements[6], elements[10], elements[14]] = [(2 * d.x) / far, (2 * d.y) / far, (2 * d.z) / far, -1];
+    return projection;
+  }
   // The fourth row is the depth along the optical axis. Corners of the image have the smallest depth at a distance.
   const w = matrixRow(clip, 3);
   const depth = Math.min(...[-1, 1].flatMap((x) => [-1, 1].map((y) => {
@@ -63,6 +72,11 @@ export function rasterProjection(picture: Picture, clip: THREE.Matrix4, nearest:
   elements[10] = w.z;
   elements[14] = w.w - 2 * near;
   return projection;
+}
+
+// Returns the distance of a place in a box from its nearest side; 0 outside of it.
+export function distanceToSides({ low, high }: Box, place: Vec3): number {
+  return Math.max(0, Math.min(...place.map((a, axis) => Math.min(a - low[axis], high[axis] - a))));
 }
 
 export function distanceToBox({ low, high }: Box, [x, y, z]: Vec3): number {

@@ -85,7 +85,8 @@ void main() {
   if (!(distance > (isBackground ? behindBox(o, d) : sceneNear) && distance < kSceneEnd)) discard;
   if (any(lessThan(fromReference, withinLow)) || any(greaterThanEqual(fromReference, withinHigh))) discard;
   float depth = dot(depthRow, vec4(fromReference, 1.0)) / dot(wRow, vec4(fromReference, 1.0));
-  if (0.5 + 0.5 * depth > texelFetch(opaqueDepth, min(ivec2(gl_FragCoord.xy), textureSize(opaqueDepth, 0) - 1), 0).r) discard;
+  float opaque = texelFetch(opaqueDepth, min(ivec2(gl_FragCoord.xy), textureSize(opaqueDepth, 0) - 1), 0).r;
+  if (opaque < 1.0 && 0.5 + 0.5 * depth > opaque) discard;
   if (hiddenBoxes > 0 && isHidden(fromReference)) discard;
   int across = int(patchLayout.y);
   vec2 texel = patchLayout.x * vec2(patchNumber % across, patchNumber / across) + 0.5 + (patchLayout.x - 1.0) * clamp(place, 0.0, 1.0);
@@ -141,7 +142,7 @@ export function rasterMaterial(kind: RasterKind, isCompressed: boolean): THREE.R
     side: THREE.DoubleSide,
     blending: kind === 'layers' ? THREE.CustomBlending : THREE.NoBlending,
     blendSrc: THREE.OneFactor, blendDst: THREE.OneFactor,
-    depthTest: kind !== 'layers', depthWrite: kind !== 'layers',
+    depthTest: kind !== 'layers', depthWrite: kind !== 'layers', depthFunc: THREE.LessDepth, // of equal hits, the first counts
     toneMapped: false,
   });
 }
