@@ -5,16 +5,11 @@ import * as THREE from 'three';
 import { displayConstants } from '../../draw/display-modes';
 import { kHarmonics, layersShader, writtenVector } from '../../draw/network-shader';
 import type { Picture } from '../../draw/picture';
+import { kScreenVertexShader } from '../../draw/screen-triangle';
 import type { ViewUniforms } from '../../raymarch/content-program';
 import { packNetwork, type DenseLayer } from '../../tiles/network';
 import { kHashModes } from './hash-modes';
 import { kWeightsOfTarget, countNetworks } from './hash-program';
-
-const kVertexShader = `
-in vec3 position;
-void main() {
-  gl_Position = vec4(position.xy, 0.0, 1.0);
-}`;
 
 const kHead = `
 precision highp float;
@@ -130,7 +125,7 @@ export class NetworkPass {
     const { opaqueDepth, resolution, part, ray, display } = this.view;
     const material = new THREE.RawShaderMaterial({
       glslVersion: THREE.GLSL3,
-      vertexShader: kVertexShader,
+      vertexShader: kScreenVertexShader,
       fragmentShader: [kHead, displayConstants(kHashModes), heaviestShader(this.weightTargets), key, kMain].join('\n'),
       uniforms: {
         opaqueDepth, resolution, part, ray, display, network: { value: 0 }, behind: { value: 0 }, hasLearnedBackground: { value: false },

@@ -2,16 +2,11 @@
 // per pixel, and their blending with the frames before.
 import * as THREE from 'three';
 import { kHarmonics, layersShader } from '../../draw/network-shader';
+import { kScreenVertexShader } from '../../draw/screen-triangle';
 import type { DenseLayer } from '../../tiles/network';
 import { kFeatures } from './mesh-content';
 import { kPartNumbersSource, kVectorsBeforeNetwork } from './part-numbers';
 import { kHalfTransparent, kModeConstants } from './raster-program';
-
-const kVertexShader = `
-in vec3 position;
-void main() {
-  gl_Position = vec4(position.xy, 0.0, 1.0);
-}`;
 
 const kHead = `
 precision highp float;
@@ -28,7 +23,7 @@ vec2 pixelNdc() {
 
 export function passMaterial(fragmentShader: string, uniforms: Record<string, THREE.IUniform>): THREE.RawShaderMaterial {
   return new THREE.RawShaderMaterial({
-    glslVersion: THREE.GLSL3, vertexShader: kVertexShader, fragmentShader, uniforms,
+    glslVersion: THREE.GLSL3, vertexShader: kScreenVertexShader, fragmentShader, uniforms,
     depthTest: false, depthWrite: false, blending: THREE.NoBlending, toneMapped: false,
   });
 }
