@@ -100,16 +100,23 @@ struct MeshPlace {
   TileFrame frame;
   uint64_t allBytes = 0, coarsestBytes = 0;
 
-  MeshPlace() {
+  // `areInferred`: whether an encoder stands for the maps of a part of each tile.
+  explicit MeshPlace(bool areInferred = false) {
     frame.low = Vec3d(-2, -2, -1);
     frame.high = Vec3d(2, 2, 1);
     for (TileNode& node : tree.tiles) {
-      MeshContent content = tiles_test::randomMeshContent(contents.size(), 3);
+      MeshContent content = areInferred ? tiles_test::inferredMeshContent(contents.size())
+                                        : tiles_test::randomMeshContent(contents.size(), 3);
       const double growth = node.level == 0 ? 1 : 2;
       for (PatchSet& part : content.parts) {
         part.step *= growth;
-        for (int axis = 0; axis < 3; ++axis)
-          part.origin[axis] = growth * part.origin[axis] + (node.low[axis] + node.high[axis]) / 2;
+        for (int axis = 0; axis < 3; ++axis) {
+          const double middle = (node.low[axis] + node.high[axis]) / 2;
+          part.origin[axis] = growth * part.origin[axis] + middle;
+          if (!part.encoder) continue;
+          part.encoder->scale[axis] /= growth;
+          part.encoder->offset[axis] -= part.encoder->scale[axis] * middle;
+        }
       }
       add(std::move(content));
       node.geometricError = 2.0 / 64 * (1 << node.level);
@@ -302,6 +309,25 @@ TEST_F(GpuDrawing, DrawsMeshInStripsIfItsFragmentsDoNotFitIntoMemory) {
   EXPECT_THROW(draw(2), Error);
 }
 
+TEST_F(GpuDrawing, DrawsMapsInferredOnTheGpuAsThoseOfTheCpu) {
+  const MeshPlace mesh(true);
+  const auto makeRenderer = [&](MeshInference inference) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    GpuRendererSettings settings;
+    settings.selection.maximumScreenSpaceError = 0.5;
+    return std::make_unique<GpuSceneRenderer>(stream, makeGpuMeshDrawer(stream, {.inference = inference}),
+                                              TileScene{mesh.frame, mesh.tree, mesh.source(), {}}, settings);
+  };
+  const auto byCpu = makeRenderer(MeshInference::cpu), byGpu = makeRenderer(MeshInference::gpu);
+  const auto automatic = makeRenderer(MeshInference::automatic);
+  for (int step = 0; step < 600; step += 150) {
+    SCOPED_TRACE(step);
+    const RenderedView expected = byCpu->render(flightCamera(), flightPose(step), nullptr);
+    EXPECT_GT(decibels(byGpu->render(flightCamera(), flightPose(step), nullptr).colour, expected.colour), 45);
+    EXPECT_GT(decibels(automatic->render(flightCamera(), flightPose(step), nullptr).colour, expected.colour), 45);
+  }
+}
+
 TEST_F(GpuDrawing, DitheredFramesOfMeshHaveTheExactImageAsTheirMean) {
   const MeshPlace mesh;
   const auto stream = std::make_shared<GpuStream>(context_);
@@ -367,6 +393,45 @@ TEST_F(GpuDrawing, FramesOfMeshAtRestHaveSmoothEdges) {
   }
   EXPECT_GT(edges, 30);
   EXPECT_LT(ofSmooth, 0.5 * ofRough);
+}
+
+TEST_F(GpuDrawing, ContentsOfMeshFadeIntoEachOtherPixelByPixel) {
+  const MeshPlace mesh;
+  constexpr float kShare = 0.25f;
+  // Each image is the first of its drawer, so that all have the same thresholds.
+  const auto draw = [&](const std::vector<std::pair<int, std::pair<float, float>>>& contents) {
+    const auto stream = std::make_shared<GpuStream>(context_);
+    const auto drawer = makeGpuMeshDrawer(stream, {.blends = false});
+    GpuFrame frame(stream);
+    std::vector<std::unique_ptr<GpuContent>> uploaded;
+    SceneView<GpuContent> view{mesh.frame, {}, nullptr, nullptr};
+    for (const auto& [tile, share] : contents) {
+      uploaded.push_back(drawer->upload(*makeContent(MeshContent(mesh.contents[tile]))));
+      view.frontToBack.emplace_back(uploaded.back().get()).share = share;
+    }
+    const Camera camera = flightCamera();
+    const Pose pose = flightPose(0);
+    DrawSettings settings;
+    settings.exact = false;
+    drawer->draw(frame, view, {camera, pose}, settings);
+    return frame.drawn();
+  };
+  const RenderedView first = draw({{0, {0, 1}}});
+  // The same content has other layers if it is the second one, hence both are there.
+  const RenderedView both = draw({{0, {0, kShare}}, {1, {kShare, 1}}}), second = draw({{0, {0, 0}}, {1, {0, 1}}});
+  int ofFirst = 0, ofSecond = 0;
+  for (size_t i = 0; i < first.depth.pixels.size(); ++i) {
+    const float depth = both.depth.pixels[i];
+    if (first.depth.pixels[i] == second.depth.pixels[i]) continue;
+    if (depth == first.depth.pixels[i])
+      ++ofFirst;
+    else if (depth == second.depth.pixels[i])
+      ++ofSecond;
+    else
+      ADD_FAILURE() << "pixel " << i << " shows neither content";
+  }
+  EXPECT_GT(ofFirst + ofSecond, 500);
+  EXPECT_NEAR(ofFirst / static_cast<double>(ofFirst + ofSecond), kShare, 0.06);
 }
 
 TEST_F(GpuDrawing, FramesOfMeshAreTheSameIfFragmentsAreDecoded) {

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "base/threads.h"
@@ -21,6 +22,9 @@ template <class ResidentContent>
 struct DrawnContent {
   const ResidentContent* content;
   Vec3d low, high;  // scene units
+  // Drawn in those pixels whose threshold lies in [first, second); all thresholds are from 0 to 1. Other shares occur
+  // only where GpuDrawer::crossFades() is true.
+  std::pair<float, float> share = {0, 1};
 
   DrawnContent(const ResidentContent* content)  // NOLINT(google-explicit-constructor): the whole content
       : DrawnContent(content, Vec3d::Constant(-INFINITY), Vec3d::Constant(INFINITY)) {}

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "render/drawer.h"
+#include "render/level_fades.h"
 #include "render/tile_cache.h"
 #include "render/tile_frame.h"
 #include "render/tile_selection.h"
@@ -23,7 +24,8 @@ class SceneTiles {
       : frame_(frame),
         tree_(std::move(tree)),
         cache_(tree_, budgetBytes, std::move(source)),
-        selector_(tree_, selection) {}
+        selector_(tree_, selection),
+        fades_(tree_) {}
   SceneTiles(const SceneTiles&) = delete;
 
   // Loads what the view requests. Rethrows what the source throws.
@@ -49,14 +51,23 @@ class SceneTiles {
     return missing_;
   }  // tiles that the last view requested and that are not in memory
 
-  // Returns what to draw for the last view. Counts as a use of each content.
-  SceneView<ResidentContent> view() {
+  // Returns what to draw for the last view. Counts as a use of each content. `crossFades`: whether contents fade into
+  // those that the view before showed in their places.
+  SceneView<ResidentContent> view(bool crossFades = false) {
     SceneView<ResidentContent> view{frame_, {}, nullptr, nullptr};
-    for (const SelectedTile& selected : cut_.tiles) {
-      if (!selected.visible) continue;
-      DrawnContent<ResidentContent>& drawn = view.frontToBack.emplace_back(cache_.find(selected.content));
-      if (selected.content == selected.tile) continue;
-      const TileBox cells = tree_.boxOfCells(selected.tile);
+    std::vector<FadedTile> tiles;
+    if (crossFades) {
+      tiles = fades_.next(cut_, [this](int tile) { return cache_.holds(tile); });
+    } else {
+      fades_.reset();
+      for (const SelectedTile& selected : cut_.tiles)
+        if (selected.visible) tiles.push_back({selected.tile, selected.content});
+    }
+    for (const FadedTile& tile : tiles) {
+      DrawnContent<ResidentContent>& drawn = view.frontToBack.emplace_back(cache_.find(tile.content));
+      drawn.share = {tile.low, tile.high};
+      if (tile.content == tile.tile) continue;
+      const TileBox cells = tree_.boxOfCells(tile.tile);
       drawn.low = cells.low;
       drawn.high = cells.high;
     }
@@ -65,6 +76,9 @@ class SceneTiles {
     if (!coarsest.empty()) view.pinned = cache_.find(coarsest.front());
     return view;
   }
+
+  // Returns whether the last view shows contents that fade, and the next view of the same camera therefore differs.
+  bool isFading() const { return fades_.isFading(); }
 
   const TileFrame& frame() const { return frame_; }
   const TileCut& cut() const { return cut_; }
@@ -88,6 +102,7 @@ class SceneTiles {
   TileTree tree_;
   TileCache<ResidentContent> cache_;
   TileSelector selector_;
+  LevelFades fades_;
   TileChoice choice_;
   TileCut cut_;
   std::vector<int> missing_;

@@ -2,6 +2,7 @@
 // shaders/compute/arguments.h.
 #ifndef TESSERA_SHADERS_REPRESENTATIONS_MESH_ARGUMENTS_MESH_H
 #define TESSERA_SHADERS_REPRESENTATIONS_MESH_ARGUMENTS_MESH_H
+#include "../../compute/arguments_hash_grid.h"
 #include "../../render/arguments_view.h"
 TESSERA_BEGIN_ARGUMENTS
 
@@ -39,8 +40,9 @@ struct PlacedPartArguments {
   float high[2];
   uint isBackground;  // hits count only behind the scene's box
   uint unused;
+  float share[2];  // drawn in pixels whose threshold is in this interval; 0 and 1: in all
 };
-TESSERA_SIZE(PlacedPartArguments, 48);
+TESSERA_SIZE(PlacedPartArguments, 56);
 
 #ifdef __cplusplus
 using PlacedPartsPointer = uint64_t;
@@ -130,6 +132,26 @@ struct BlendFramesArguments {
   uint unused;
 };
 TESSERA_SIZE(BlendFramesArguments, 248);
+
+// The inference of the textures of a part (src/representations/mesh/content/infer_maps.h).
+struct InferMapsArguments {
+  MeshPartPointer part;  // whose textures are written
+  UintPointer table;     // of the encoder: numbers in fp16, two in a word
+  Bits64 layers;         // LayersPointer, of the encoder's network
+  Bits64 weights;        // FloatPointer
+  uint layerCount;
+  uint levelCount;
+  uint features;  // of an entry of the table
+  uint blocks;    // of 4×4 texels in all patches
+  uint places;    // along an edge of a texel, which is their mean
+  float opacityOffset;
+  float opaqueFrom;
+  float transparentBelow;
+  float unitOrigin[3];  // the number v of a vertex along an axis stands for unitOrigin + unitStep · v in the unit cube
+  float unitStep[3];
+  LevelArguments levels[TESSERA_MAX_LEVELS];
+};
+TESSERA_SIZE(InferMapsArguments, 88 + 24 * TESSERA_MAX_LEVELS);
 
 // The triangles of one part.
 struct DrawTrianglesArguments {

@@ -34,6 +34,8 @@ layout(location = 0) out vec4 decoded;
 layout(location = 0) out uvec2 visible;
 #endif
 
+const uint kFadeLayer = 0xfade;  // of the thresholds between contents
+
 void main() {
   MeshViewPointer view = arguments.values.view;
   const uint number = arguments.values.part;
@@ -49,8 +51,14 @@ void main() {
   if (placed.isBackground != 0) near = behindBox(view.value.view, fromEye / distance);
   if (view.value.isSamePixels != 0) far = farthestDistance(view.value.view, rasterPixel);
   if (!(opacity > 0 && distance > near && distance < far && isInCells(placed, fromEye))) discard;
+  // Contents that fade into each other have the same thresholds, so that each pixel shows one of them.
+  const bool isFading = placed.share[1] - placed.share[0] < 1;
+  if (isFading) {
+    const float threshold = ditherThreshold(pixel, view.value.frame, kFadeLayer);
+    if (threshold < placed.share[0] || threshold >= placed.share[1]) discard;
+  }
   // Stores take place even if the fragment is hidden.
-  if (opacity < 1) atomicMax(view.value.nearest.values[rasterPixel], floatBitsToUint(1 / distance));
+  if (opacity < 1 || isFading) atomicMax(view.value.nearest.values[rasterPixel], floatBitsToUint(1 / distance));
   if (opacity <= ditherThreshold(pixel, view.value.frame, layer)) discard;
 #ifdef DECODES
   decoded = vec4(decode(placed.part, around, directionHarmonics(fromEye / distance)), distance);

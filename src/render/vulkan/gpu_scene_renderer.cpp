@@ -4,10 +4,14 @@
 
 namespace tessera {
 
+std::function<std::unique_ptr<Content>(int tile)> GpuSceneRenderer::prepared(const TileSource<Content>& source) const {
+  return [drawer = drawer_.get(), load = source.load](int tile) { return drawer->prepare(load(tile)); };
+}
+
 TileSource<GpuContent> GpuSceneRenderer::uploaded(const TileSource<Content>& source) {
   TileSource<GpuContent> gpuSource;
   gpuSource.bytes = [this, bytes = source.bytes](int tile) { return drawer_->residentBytes(bytes(tile)); };
-  gpuSource.load = [this, load = source.load](int tile) {
+  gpuSource.load = [this, load = prepared(source)](int tile) {
     const bool isRead = prefetch_ && prefetch_->isReady(tile);
     return drawer_->upload(*(isRead ? prefetch_->take(tile) : load(tile)));
   };
@@ -25,12 +29,14 @@ GpuSceneRenderer::GpuSceneRenderer(std::shared_ptr<GpuStream> stream, std::uniqu
                                    TileScene scene, const GpuRendererSettings& settings)
     : stream_(std::move(stream)),
       drawer_(std::move(drawer)),
-      prefetch_(settings.inBackground ? std::make_unique<TilePrefetch<std::unique_ptr<Content>>>(scene.source.load)
+      prefetch_(settings.inBackground ? std::make_unique<TilePrefetch<std::unique_ptr<Content>>>(prepared(scene.source))
                                       : nullptr),
       tiles_(scene.frame, std::move(scene.tree), uploaded(scene.source), settings.selection, settings.budgetBytes),
       settings_(settings),
       background_(scene.background[0], scene.background[1], scene.background[2]),
-      frame_(stream_) {}
+      frame_(stream_) {
+  drawer_->setPoolBudget(settings.poolBytes);
+}
 
 void GpuSceneRenderer::queue(const ViewRequest& request, bool exact) {
   const TileView view = tileView(request.camera, request.worldFromCamera, tiles_.frame());
@@ -46,7 +52,7 @@ void GpuSceneRenderer::queue(const ViewRequest& request, bool exact) {
   }
   DrawSettings settings = settings_.draw;
   settings.exact = exact;
-  drawer_->draw(frame_, tiles_.view(), request, settings);
+  drawer_->draw(frame_, tiles_.view(!exact && drawer_->crossFades()), request, settings);
 }
 
 RenderedView GpuSceneRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
@@ -61,8 +67,9 @@ GpuRenderedView GpuSceneRenderer::draw(const Camera& camera, const Pose& worldFr
 }
 
 bool GpuSceneRenderer::hasMore() const {
-  return drawer_->wantsAnotherFrame() || std::any_of(tiles_.missing().begin(), tiles_.missing().end(),
-                                                     [this](int tile) { return prefetch_->isReady(tile); });
+  return drawer_->wantsAnotherFrame() || tiles_.isFading() ||
+         std::any_of(tiles_.missing().begin(), tiles_.missing().end(),
+                     [this](int tile) { return prefetch_->isReady(tile); });
 }
 
 SceneState GpuSceneRenderer::state() const {

@@ -13,6 +13,7 @@ struct GpuRendererSettings {
   DrawSettings draw;  // render() is always exact; draw() follows `exact`
   SelectionSettings selection;
   uint64_t budgetBytes = uint64_t{1} << 30;  // GPU memory for contents
+  uint64_t poolBytes = uint64_t{1} << 28;    // GPU memory for what the drawer makes besides them
   // If true, contents are read by background threads and each image shows what is resident; otherwise each image waits
   // for everything that it requests.
   bool inBackground = false;
@@ -69,6 +70,7 @@ class GpuSceneRenderer final : public GpuViewRenderer {
 
  private:
   void queue(const ViewRequest& request, bool exact);
+  std::function<std::unique_ptr<Content>(int tile)> prepared(const TileSource<Content>& source) const;
   TileSource<GpuContent> uploaded(const TileSource<Content>& source);
 
   std::shared_ptr<GpuStream> stream_;

@@ -5,6 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <thread>
 
 #include "gpu/testing/test_context.h"
 #include "render/testing/numbered_contents.h"
@@ -14,9 +17,11 @@ namespace {
 
 struct Asked {
   int uploaded = 0;
-  std::vector<int> drawn;  // tiles of the last image, in the order in which they were passed
+  std::vector<int> drawn;                       // tiles of the last image, in the order in which they were passed
+  std::vector<std::pair<float, float>> shares;  // of the pixels, of each of them
   DrawSettings settings;
-  bool wantsAnotherFrame = false;
+  bool wantsAnotherFrame = false, crossFades = false;
+  std::atomic<int> prepared = 0;
 };
 
 struct NumberedGpuContent final : GpuContent {
@@ -31,20 +36,29 @@ class AskedDrawer final : public GpuDrawer {
 
   uint64_t residentBytes(uint64_t decodedBytes) const override { return 3 * decodedBytes; }
   uint64_t residentBytesOfResource(uint64_t decodedBytes) const override { return 2 * decodedBytes; }
+  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
+    ++asked_->prepared;
+    static_cast<NumberedContent&>(*content).prepared = true;
+    return content;
+  }
   std::unique_ptr<GpuContent> upload(const Content& content) override {
+    EXPECT_TRUE(static_cast<const NumberedContent&>(content).prepared);
     ++asked_->uploaded;
     return std::make_unique<NumberedGpuContent>(static_cast<const NumberedContent&>(content).tile);
   }
   void draw(GpuFrame& frame, const SceneView<GpuContent>& view, const ViewRequest& request,
             const DrawSettings& settings) override {
     asked_->drawn.clear();
+    asked_->shares.clear();
     for (const DrawnContent<GpuContent>& drawn : view.frontToBack) {
+      asked_->shares.push_back(drawn.share);
       asked_->drawn.push_back(static_cast<const NumberedGpuContent&>(*drawn.content).tile);
     }
     asked_->settings = settings;
     frame.begin(view.frame, settings.minTransmittance, 4, request);
   }
   bool wantsAnotherFrame() const override { return asked_->wantsAnotherFrame; }
+  bool crossFades() const override { return asked_->crossFades; }
 
  private:
   Asked* asked_;
@@ -100,6 +114,44 @@ TEST_F(GpuSceneRendererCalls, AskForExactPicturesAlwaysInRenderAndByTheSettingsI
     EXPECT_EQ(asked_.settings.minTransmittance, 0.25f);
     renderer.draw(place_.camera(), place_.above());
     EXPECT_EQ(asked_.settings.exact, exact);
+  }
+}
+
+TEST_F(GpuSceneRendererCalls, PrepareEachContentBeforeItsUpload) {
+  GpuRendererSettings settings = within(kAll);
+  for (const bool inBackground : {false, true}) {
+    settings.inBackground = inBackground;
+    asked_.prepared = asked_.uploaded = 0;
+    GpuSceneRenderer renderer = rendererWith(settings);
+    for (int i = 0; i < 5000 && asked_.uploaded < 5; ++i) {
+      renderer.draw(place_.camera(), place_.above());
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    EXPECT_EQ(asked_.uploaded, 5);
+    EXPECT_EQ(asked_.prepared, 5);
+  }
+}
+
+TEST_F(GpuSceneRendererCalls, FadeBetweenLevelsInFramesThatNeedNotBeExact) {
+  GpuRendererSettings settings = within(kAll);
+  settings.draw.exact = false;
+  Pose high = place_.above();
+  high.translation.z() = 1000;  // where the root is drawn
+  const std::pair<float, float> everywhere = {0, 1};
+  for (const bool crossFades : {false, true}) {
+    asked_.crossFades = crossFades;
+    settings.selection.maximumScreenSpaceError = 0.01;
+    GpuSceneRenderer renderer = rendererWith(settings);
+    renderer.draw(place_.camera(), high);
+    ASSERT_EQ(asked_.drawn, std::vector<int>{0});
+    EXPECT_FALSE(renderer.hasMore());
+    renderer.draw(place_.camera(), place_.above());
+    EXPECT_EQ(asked_.drawn.size(), crossFades ? 8u : 4u);
+    EXPECT_EQ(renderer.hasMore(), crossFades);
+    for (const auto& share : asked_.shares) EXPECT_EQ(share == everywhere, !crossFades);
+    renderer.render(place_.camera(), place_.above(), nullptr);
+    EXPECT_EQ(asked_.drawn.size(), 4u) << "exact images have no history";
+    EXPECT_FALSE(renderer.hasMore());
   }
 }
 

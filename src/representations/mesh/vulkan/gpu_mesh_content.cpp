@@ -12,12 +12,15 @@ static_assert(kMeshFeatures == TESSERA_MESH_FEATURES);
 
 // The addresses are offsets in `packed`.
 arguments::MeshPartArguments packPart(const PatchSet& part, PackedContent& packed, uint32_t& maxWidth) {
-  CHECK(!part.opacityBlocks.empty());
+  const bool hasMaps = !part.opacityBlocks.empty();
+  CHECK((hasMaps || part.encoder.has_value()));
   arguments::MeshPartArguments packedPart = {};
   packedPart.vertices = packed.add(part.vertices);
+  const std::vector<uint8_t> none(hasMaps ? 0 : PatchSet::kBc5Bytes * part.textureBlocks());
   for (uint32_t texture = 0; texture < PatchSet::kFeatureTextures; ++texture)
-    packedPart.features[texture] = packed.add(part.featureBlocks[texture]);
-  packedPart.opacities = packed.add(part.opacityBlocks);
+    packedPart.features[texture] = packed.add(hasMaps ? part.featureBlocks[texture] : none);
+  packedPart.opacities =
+      packed.add(hasMaps ? part.opacityBlocks : std::vector<uint8_t>(PatchSet::kBc4Bytes * part.textureBlocks()));
   const GpuNetwork network = addNetwork(part.decoder, packed);
   packedPart.layers = network.layers;
   packedPart.weights = network.weights;

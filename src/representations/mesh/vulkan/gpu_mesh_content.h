@@ -9,8 +9,8 @@
 
 namespace tessera {
 
-// It takes no more GPU memory than the content from which it was made takes in main memory. All of its parts must have
-// maps.
+// It takes no more GPU memory than the content from which it was made takes in main memory. The textures of parts whose
+// maps are yet to be inferred are filled with zeros (GpuInference).
 struct GpuMeshContent final : GpuContent {
   GpuMeshContent(const std::shared_ptr<GpuStream>& stream, const MeshContent& content);
 

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 
+#include "base/check.h"
 #include "render/vulkan/kernel_variants.h"
 #include "representations/mesh/content/infer_maps.h"
 #include "representations/mesh/vulkan/frame_blend.h"
+#include "representations/mesh/vulkan/gpu_inference.h"
 #include "representations/mesh/vulkan/gpu_mesh_content.h"
 #include "representations/mesh/vulkan/layer_lists.h"
 #include "representations/mesh/vulkan/placed_parts.h"
@@ -54,18 +57,39 @@ class GpuMeshDrawer final : public GpuDrawer {
         parts_(stream),
         lists_(stream, settings.listedFragments),
         visible_(stream, settings.decodesFragments),
-        blend_(stream) {}
+        blend_(stream),
+        inference_(stream) {}
 
   ~GpuMeshDrawer() override {
     if (noise_) stream_->deferDestroy(std::move(noise_));
   }
 
+  // Encoders are in GPU memory as far as the pool's budget allows, and otherwise only while maps are inferred.
+  uint64_t residentBytesOfResource(uint64_t) const override { return 0; }
+
+  std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
+    if (infersOnGpu()) return content;
+    auto* decoded = dynamic_cast<ContentOf<MeshContent>*>(content.get());
+    CHECK(decoded != nullptr);
+    if (!decoded->value.encoders.empty()) {
+      const std::lock_guard lock(inferring_);
+      inferMapsOnCpu(decoded->value, 0);
+    }
+    return content;
+  }
+
   std::unique_ptr<GpuContent> upload(const Content& content) override {
     const MeshContent& mesh = contentAs<MeshContent>(content);
-    if (mesh.encoders.empty()) return std::make_unique<GpuMeshContent>(stream_, mesh);
+    auto onGpu = std::make_unique<GpuMeshContent>(stream_, mesh);
+    if (mesh.encoders.empty() || !infersOnGpu() || inference_.infer(mesh, *onGpu)) return onGpu;
     MeshContent inferred = mesh;
     inferMapsOnCpu(inferred, 0);
     return std::make_unique<GpuMeshContent>(stream_, inferred);
+  }
+
+  void setPoolBudget(uint64_t bytes) override {
+    inference_.setBudget(bytes / 2);
+    lists_.setBudget(bytes / 2);
   }
 
   void draw(GpuFrame& frame, const SceneView<GpuContent>& view, const ViewRequest& request,
@@ -102,9 +126,16 @@ class GpuMeshDrawer final : public GpuDrawer {
     wantsAnotherFrame_ = blend_.framesAtRest() < kFramesAtRest;
   }
 
+  bool crossFades() const override { return true; }
+
   bool wantsAnotherFrame() const override { return wantsAnotherFrame_; }
 
  private:
+  bool infersOnGpu() const {
+    if (settings_.inference != MeshInference::automatic) return settings_.inference == MeshInference::gpu;
+    return !stream_->context()->isCpu();
+  }
+
   static constexpr uint32_t kFramesAtRest = 64;  // their mean is shown where nothing moves
 
   void drawExact(GpuFrame& frame, arguments::MeshViewArguments& mesh) {
@@ -146,7 +177,9 @@ class GpuMeshDrawer final : public GpuDrawer {
   LayerLists lists_;
   VisibleLayers visible_;
   FrameBlend blend_;
-  Camera camera_;  // of the last image
+  GpuInference inference_;
+  mutable std::mutex inferring_;  // by one thread at a time, which uses all processors
+  Camera camera_;                 // of the last image
   RasterViews rasters_;
   GpuBuffer noise_;
   uint32_t frameNumber_ = 0;

@@ -22,6 +22,8 @@ arguments::PlacedPartArguments placePart(const GpuMeshContent::Part& part, const
     placed.high[axis] = static_cast<float>(drawn.high[axis] - eye[axis]);
   }
   placed.isBackground = isBackground ? 1 : 0;
+  placed.share[0] = drawn.share.first;
+  placed.share[1] = drawn.share.second;
   return placed;
 }
 
@@ -59,9 +61,9 @@ bool PlacedParts::place(const SceneView<GpuContent>& view, const Vec3d& eye) {
   for (const DrawnContent<GpuContent>& drawn : view.frontToBack) add(drawn, false);
   ofTiles_ = drawn_.size();
   if (view.backgroundBlock != nullptr) add(view.backgroundBlock, true);
-  std::vector<uint64_t> addresses;
-  for (const arguments::PlacedPartArguments& part : all) addresses.push_back(part.part);
-  const bool isChanged = addresses != std::exchange(addresses_, addresses);
+  std::vector<ShownPart> shown;
+  for (const arguments::PlacedPartArguments& part : all) shown.push_back({part.part, part.share[0], part.share[1]});
+  const bool isChanged = shown != std::exchange(shown_, shown);
   if (all.empty()) return isChanged;
   const auto bytes = std::as_bytes(std::span(all));
   if (placed_.bytes() < bytes.size()) {

@@ -40,7 +40,12 @@ class PlacedParts {
   GpuBuffer placed_;
   std::vector<DrawnPart> drawn_;  // those of tiles first
   size_t ofTiles_ = 0;
-  std::vector<uint64_t> addresses_;  // of the parts
+  struct ShownPart {
+    uint64_t address = 0;
+    float low = 0, high = 1;  // its share of pixels
+    bool operator==(const ShownPart&) const = default;
+  };
+  std::vector<ShownPart> shown_;
   uint32_t maxWidth_ = 0;
 };
 
