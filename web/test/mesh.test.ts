@@ -177,6 +177,41 @@ describe.skipIf(missing())('a scene of mesh', () => {
     behind.forEach((value, c) => expect(Math.abs(value - without[pixel + c])).toBeLessThan(9));
   });
 
+  it('draws solid surfaces in motion only for what they may hide, and for picking', async () => {
+    let nudge = 0;
+    const countTriangles = async () => page.evaluate((one) => {
+      const { info } = headlessPage.renderer;
+      info.autoReset = false;
+      info.reset();
+      headlessPage.times(one, 1);
+      info.autoReset = true;
+      return info.render.triangles;
+    }, { ...atFacade, cx: atFacade.cx + 0.01 * ++nudge });
+    await picture(atFacade);
+    const alone = await countTriangles();
+    await page.evaluate(() => headlessPage.addBox([-1.15, 0.5, 0], [-0.85, 0.7, 0.3])); // behind the facade
+    const withOpaque = await countTriangles();
+    const reds = (pixels: Uint8Array) => pixels.filter((value, at) => at % 3 === 0 && value > 235 && pixels[at + 1] < 20).length;
+    await page.evaluate(() => ((headlessPage.world.getObjectByName('box') as any).material.transparent = true));
+    const atRest = reds(await picture(atFacade)); // between what is solid
+    const withTransparent = await countTriangles();
+    const inMotion = reds(await shown());
+    expect(atRest).toBeGreaterThan(100);
+    expect(Math.abs(inMotion - atRest)).toBeLessThan(20);
+    await page.evaluate(() => headlessPage.removeBox());
+    const others = 40; // of boxes and passes over the picture
+    expect(Math.abs(withOpaque - alone)).toBeLessThan(others);
+    expect(withTransparent).toBeGreaterThan(1.8 * alone - others);
+    expect(alone).toBeGreaterThan(10 * others);
+
+    const at = [0.5, -0.55] as const;
+    await picture(atFacade);
+    const resting = await page.evaluate(([x, y]) => headlessPage.surfaceAt(x, y), at);
+    await picture(above);
+    await frame(atFacade);
+    expect(await page.evaluate(([x, y]) => headlessPage.surfaceAt(x, y), at)).toEqual(resting);
+  });
+
   it('follows models that move while the camera rests', async () => {
     await page.evaluate(() => headlessPage.addBox([-1.15, -0.8, 0], [-0.85, -0.6, 0.3]));
     const reds = (pixels: Uint8Array) => pixels.filter((value, at) => at % 3 === 0 && value > 235 && pixels[at + 1] < 20).length;

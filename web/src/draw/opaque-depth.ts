@@ -30,6 +30,7 @@ function describeObject(object: THREE.Object3D, isSurface: boolean): number[] {
 
 export class OpaqueDepth {
   hasChanged = false; // whether the depth may be another one than that of the last call of `draw` for the same cameras
+  hidesBehindScene = false; // whether the world has anything that is drawn after the scene, and that its surface may hide
   private target?: THREE.WebGLRenderTarget;
   private lastState: number[] = [];
 
@@ -50,6 +51,7 @@ export class OpaqueDepth {
     const layers = new THREE.Layers();
     layers.mask = pictures.reduce((mask, { camera }) => mask | camera.layers.mask, 0);
     const ends = new Set<THREE.Object3D>(); // objects that end rays
+    this.hidesBehindScene = false;
     const look = (object: THREE.Object3D) => {
       if (!object.visible) return; // children are invisible too
       const { material } = object as THREE.Mesh;
@@ -59,6 +61,7 @@ export class OpaqueDepth {
           // Materials that are transparent or write no depth end no rays; other materials of the same object may.
           if (!surfaces.has(object) && (one.transparent || !one.depthWrite)) seeThrough.add(one);
           else ends.add(object);
+          if (object.parent !== scene && one.transparent && one.depthTest) this.hidesBehindScene = true;
         }
       }
       for (const child of object.children) look(child);

@@ -34,6 +34,7 @@ export interface DrawSettings {
   featureLevel: number; // the level that a feature-level mode shows
   framesAtRest: number; // how many frames are blended where nothing moves, if the drawer blends frames
   antialiases: boolean; // these frames show different places within the pixels
+  hidesOthers: boolean; // something is drawn after the scene that its surface may hide
   endsRays: boolean; // rays that hit nothing are opaque, in scenes that declare so
   // Boxes in which nothing is drawn, and boxes in which nothing of the background block is drawn. Each matrix maps the
   // unit cube centred at the origin to the scene. Degenerate boxes hide nothing.

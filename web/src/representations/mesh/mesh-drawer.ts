@@ -6,7 +6,7 @@ import { kMaxHiddenBoxes, selectHiddenBoxes, type HiddenBoxes } from '../../draw
 import { farthestDepth } from '../../draw/opaque-depth';
 import { drawIntoTargets } from '../../draw/own-targets';
 import { isParallel, type Picture } from '../../draw/picture';
-import { readSurface } from '../../draw/read-surface';
+import { pixelAt, placeAtDistance } from '../../draw/read-surface';
 import { kFarAway, type ContentPlace, type DrawnPart, type DrawnScene, type DrawSettings, type SceneDrawer, type SceneView } from '../../draw/scene-drawer';
 import { screenTriangle } from '../../draw/screen-triangle';
 import type { Box } from '../../tiles/tileset';
@@ -55,6 +55,8 @@ interface LastFrame {
   key: string;
   isDrawn: boolean;
   pictures: { clipFromScene: THREE.Matrix4; part: THREE.Vector4; forward: THREE.Vector3 }[];
+  contents: DrawnPart<DrawnMesh>[][];
+  hidden: HiddenBoxes;
 }
 
 export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMesh> {
@@ -95,7 +97,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       featuresSecond: { value: featuresSecond }, decoded: { value: decoded.texture }, history: { value: history.texture },
       from: { value: output.target.textures[0] }, sky: { value: null },
       partNumbers: this.numbers.texture, vectorsOfPart: this.numbers.vectorsOfPart,
-      weight: { value: 1 }, hasHistory: { value: false }, isResting: { value: false },
+      hasSurface: { value: false }, weight: { value: 1 }, hasHistory: { value: false }, isResting: { value: false },
       previousClip: { value: new THREE.Matrix4() }, previousPart: { value: new THREE.Vector4() },
     };
     this.passes = {
@@ -197,10 +199,11 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   draw({ pictures, contents, opaqueDepth, hasOpaqueDepthChanged }: SceneView<DrawnMesh>, settings: DrawSettings): boolean {
     const key = JSON.stringify([
       pictures.map(({ clipFromScene, part }) => [clipFromScene.elements, part]),
-      contents.map((parts) => parts.map(({ content: { id }, within }) => [id, within])), settings, opaqueDepth !== null,
+      contents.map((parts) => parts.map(({ content: { id }, within }) => [id, within])), { ...settings, hidesOthers: false }, opaqueDepth !== null,
     ]);
     const isResting = this.last?.key === key && !hasOpaqueDepthChanged;
     this.pictures = pictures;
+    this.uniforms.hasSurface.value &&= this.last?.key === key && !hasOpaqueDepthChanged;
     if (isResting && this.framesAtRest >= settings.framesAtRest) return this.last!.isDrawn;
     const hidden = selectHiddenBoxes(settings.hidden, settings.hiddenOfBackgroundBlock);
     this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
@@ -215,12 +218,15 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.uniforms.jitter.value = isResting && settings.antialiases ? frameJitter(this.framesAtRest - 1) : new THREE.Vector2();
     this.uniforms.weight.value = isResting ? 1 / this.framesAtRest : kWeightInMotion;
     drawIntoTargets(this.renderer, pictures, () => {
+      // What is solid is the same in all frames at rest. In motion it is drawn only if it is needed: it takes as long as
+      // what is visible.
+      if ((isResting || settings.hidesOthers) && !this.uniforms.hasSurface.value) this.drawSurfaces(pictures, contents, hidden);
       pictures.forEach((picture, i) => this.drawOne(picture, contents[i], settings, hidden, i, isResting));
       this.run(this.passes.copy, this.targets.history, pictures);
     });
     const isDrawn = contents.some((ofOne) => ofOne.length > 0);
     this.last = {
-      key, isDrawn,
+      key, isDrawn, contents, hidden,
       pictures: pictures.map((picture) => ({ clipFromScene: picture.clipFromScene, part: picture.part, forward: viewDirection(picture) })),
     };
     return isDrawn;
@@ -231,7 +237,13 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   }
 
   surfaceAt(renderer: THREE.WebGLRenderer, picture: Picture, at: THREE.Vector2): THREE.Vector3 | undefined {
-    return readSurface(renderer, { target: this.targets.output.target, distancesOfBytes: this.distancesOfBytes }, picture, at);
+    if (!this.last) return undefined;
+    if (!this.uniforms.hasSurface.value) {
+      const { contents, hidden } = this.last;
+      drawIntoTargets(renderer, this.pictures, () => this.drawSurfaces(this.pictures, contents, hidden));
+    }
+    const distance = this.targets.readSolidDistance(renderer, pixelAt(picture, at));
+    return distance === undefined ? undefined : placeAtDistance(picture, at, distance);
   }
 
   dispose(): void {
@@ -259,11 +271,20 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.pass.children = [];
   }
 
+  private drawSurfaces(pictures: readonly Picture[], contents: DrawnPart<DrawnMesh>[][], hidden: HiddenBoxes): void {
+    const jitter = this.uniforms.jitter.value;
+    this.uniforms.jitter.value = new THREE.Vector2(); // surfaces are those in the middles of pixels
+    pictures.forEach((picture, i) => {
+      this.drawTriangles(picture, contents[i], 'solid', this.targets.solid, this.place(picture, contents[i], hidden));
+    });
+    this.uniforms.jitter.value = jitter;
+    this.uniforms.hasSurface.value = true;
+  }
+
   private drawOne(picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], settings: DrawSettings, hidden: HiddenBoxes, number: number, isResting: boolean): void {
-    const { solid, dithered, decoded, output } = this.targets;
+    const { dithered, decoded, output } = this.targets;
     const point = this.place(picture, frontToBack, hidden);
     const isLayers = settings.display === 'layers';
-    if (!isResting) this.drawTriangles(picture, frontToBack, 'solid', solid, point); // at rest it would be the same again
     if (!isLayers) this.drawTriangles(picture, frontToBack, 'dithered', dithered, point);
     decoded.viewport.copy(picture.part);
     this.renderer.setRenderTarget(decoded);

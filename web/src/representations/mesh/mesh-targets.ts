@@ -60,6 +60,17 @@ export class MeshTargets {
     });
   }
 
+  // Returns the distance of the solid surface in a pixel, if there is one.
+  readSolidDistance(renderer: THREE.WebGLRenderer, [x, y]: [number, number]): number | undefined {
+    const gl = renderer.getContext() as WebGL2RenderingContext;
+    const before = renderer.getRenderTarget();
+    const read = new Uint32Array(4); // part, and bits of the distance
+    renderer.setRenderTarget(this.solid);
+    gl.readPixels(x, y, 1, 1, gl.RGBA_INTEGER, gl.UNSIGNED_INT, read);
+    renderer.setRenderTarget(before);
+    return read[0] === 0 ? undefined : new Float32Array(read.buffer)[1];
+  }
+
   dispose(): void {
     this.output.target.depthTexture?.dispose();
     for (const target of this.all) target.dispose();

@@ -100,6 +100,7 @@ uniform sampler2D decoded, history;
 uniform usampler2D visible, solid;
 uniform float weight;  // of this frame
 uniform bool hasHistory, isResting;
+uniform bool hasSurface;  // otherwise what is visible stands for the solid surface
 uniform mat4 previousClip;  // of places relative to the reference point, in the previous picture
 uniform vec4 previousPart;
 const float kLargestDeviation = 1.0;
@@ -157,7 +158,7 @@ void main() {
       colourAndOpacity = mix(clamp(before, max(low, mean - reach), min(high, mean + reach)), frame, weight);
     }
   }
-  uvec2 surface = texelFetch(solid, at, 0).xy;
+  uvec2 surface = hasSurface ? texelFetch(solid, at, 0).xy : texelFetch(visible, at, 0).xy;
   float distance = uintBitsToFloat(surface.y);
 #ifdef DISTANCES_OF_BYTES
   distance /= distance + 1.0;
