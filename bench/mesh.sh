@@ -42,8 +42,8 @@
 #   maps         that scene with stored and with inferred maps, without ordinary meshes, through Vulkan: images, bytes that are
 #                read, memory, and seconds until the image is complete, inferred on the CPU and on the GPU
 #   flight       a city of 4x4 blocks, barely trained, in a flight of 600 steps with a quarter of the finest level's memory, through
-#                Vulkan with stored and with inferred maps, and in the browser with stored ones, there also its first image on
-#                networks of several speeds: never over the budget, never blank
+#                Vulkan with stored and with inferred maps, and in the browser with stored ones: never over the budget, never
+#                blank; and the first image of the scene of `maps` in the browser, on networks of several speeds
 #   fallback     the ordinary glTF meshes in the contents of that scene's finest level, in Blender, assimp and three.js: they load with
 #                the same numbers of triangles; and held-out views of three.js and Blender, without mipmaps and antialiasing, against
 #                the scene without view dependence (every hit has the base colour of its texels), the scene as it is, an
@@ -630,16 +630,21 @@ browser() {
     npx vitest run bench/mesh.ts --config vitest.bench.config.ts --disable-console-intercept)
 }
 
+# bothMaps MODEL NAME: scenes NAME-stored.scene and NAME-inferred.scene, without ordinary meshes.
+bothMaps() {
+  local kind
+  for kind in stored inferred; do
+    [ -e "$work/$2-$kind.scene/tileset.json" ] || "$tessera" bake "$work/$1" "$work/$2-$kind.scene" --maps "$kind" --fallback 0
+  done
+}
+
 maps() {
   need_tessera
   local program=build/release/bench/mesh_flight result=$work/maps.json kind
   [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_flight"
   [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
   trained city-mesh city --method mesh --minutes 15
-  for kind in stored inferred; do
-    [ -e "$work/city-$kind.scene/tileset.json" ] ||
-      "$tessera" bake "$work/city-mesh" "$work/city-$kind.scene" --maps "$kind" --fallback 0
-  done
+  bothMaps city-mesh city
   [ -s "$result" ] || "$program" "$work/city-stored.scene" "$work/city-inferred.scene" > "$result"
   jq -c . "$result"
   for kind in cpu gpu; do
@@ -652,15 +657,17 @@ flight() {
   need_tessera
   local program=build/release/bench/mesh_flight kind result
   [ -x "$program" ] || die "$program: not built; run: tools/build.sh release mesh_flight"
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
   [ -e "$work/flight/transforms.json" ] ||
     "$tessera" synth city "$work/flight" --blocks 4x4 --size 160x120 --samples 1
   trained flight-model flight --method mesh --blocks 4x4 --steps 100 --set coarse_steps=300 --set grid_log2_size=14 \
     --set mesh_cells=32 --set background_cells=32 --set mesh_levels=3 --set occupancy_start_steps=16 --set occupancy_every=4 \
     --set vertex_start_steps=10 --set opacity_offset=-1 --set samples_per_step=16384 --set learning_rate=0.02 --set fitted_levels=false
+  bothMaps flight-model flight
+  trained city-mesh city --method mesh --minutes 15
+  bothMaps city-mesh city
   for kind in stored inferred; do
     result=$work/flight-$kind.json
-    [ -e "$work/flight-$kind.scene/tileset.json" ] ||
-      "$tessera" bake "$work/flight-model" "$work/flight-$kind.scene" --maps "$kind" --fallback 0
     [ -s "$result" ] || "$program" "$work/flight-$kind.scene" > "$result"
     jq -c . "$result"
     verdict "$kind maps, memory of contents at most, as a share of the budget" \
@@ -673,10 +680,15 @@ flight() {
   tools/install-debian-packages.sh --browser
   tools/build-web.sh
   local root=$PWD
-  (cd web && SMALL_SCENE="$root/$work/city-mesh.scene" SMALL_CAPTURE="$root/$work/city" LARGE_SCENE="$root/$work/flight-stored.scene" \
-    FINEST_BYTES=$("$root/$tessera" info "$root/$work/flight-stored.scene" --json | jq .level_0.bytes_in_memory) \
-    TESSERA=$(realpath "$root/$tessera") xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" \
-    npx vitest run bench/viewer.ts -t "first picture|600 steps" --config vitest.bench.config.ts --disable-console-intercept)
+  # flown LARGE_SCENE TEST
+  flown() {
+    (cd web && SMALL_SCENE="$root/$work/city-mesh.scene" SMALL_CAPTURE="$root/$work/city" LARGE_SCENE=$1 \
+      FINEST_BYTES=$("$root/$tessera" info "$1" --json | jq .level_0.bytes_in_memory) \
+      TESSERA=$(realpath "$root/$tessera") xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" \
+      npx vitest run bench/viewer.ts -t "$2" --config vitest.bench.config.ts --disable-console-intercept)
+  }
+  flown "$root/$work/city-stored.scene" "first picture"
+  flown "$root/$work/flight-stored.scene" "600 steps"
 }
 
 # withoutMasks FROM TO: copies a capture without its masks.

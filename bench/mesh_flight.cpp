@@ -31,8 +31,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kWidth = 320, kHeight = 180;
+constexpr int kWidth = 160, kHeight = 90;
 constexpr int kViews = 5;
+constexpr double kError = 0.25;  // pixels: more is requested than the budget holds
 constexpr uint64_t kPoolBytes = uint64_t{64} << 20;
 
 double secondsSince(Clock::time_point begin) {
@@ -167,6 +168,7 @@ nlohmann::ordered_json fly(const Place& place, int steps) {
   settings.poolBytes = kPoolBytes;
   settings.inBackground = true;
   settings.draw.exact = false;
+  settings.selection.maximumScreenSpaceError = kError;
   GpuSceneRenderer gpu(stream, makeGpuMeshDrawer(stream), place.open(), settings);
   drawUntilComplete(gpu, place, place.along(0));
   // Images, staging buffers and what else does not depend on contents, and the pool.

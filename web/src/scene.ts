@@ -23,7 +23,8 @@ import { kCodecs, type KnownRepresentation } from './representations/codecs';
 import { getDrawing, type DisplayMode, type KnownDrawing } from './representations/drawers';
 import { SceneError } from './scene-error';
 import { ServedFiles, type ContentFile, type SceneFiles } from './scene-files';
-import { TileSelector, kSelectionSettings, type SelectionSettings } from './stream/tile-selector';
+import { LevelFades, type FadedTile } from './stream/level-fades';
+import { TileSelector, kSelectionSettings, type SelectedTile, type SelectionSettings } from './stream/tile-selector';
 import { boxOfCells, coarsestTiles, cutFrontToBack, tileTree, type TileTree } from './stream/tile-tree';
 import { jointView } from './stream/tile-view';
 import { kStreamSettings, TileStreamer, type StreamSettings, type StreamStatistics } from './stream/tile-streamer';
@@ -96,6 +97,7 @@ export class TesseraScene extends THREE.Object3D {
   private drawer?: SceneDrawer;
   private streamer?: Streamer;
   private mesh?: ReturnType<typeof cityMesh>;
+  private readonly fades: LevelFades;
   private drawn: number[] = [];
   private shown = ''; // differs when the scene's own depth may, for the same cameras
   private lastBehind = ''; // `shown` of the scenes behind this one
@@ -131,6 +133,7 @@ export class TesseraScene extends THREE.Object3D {
     this.selection = { ...kSelectionSettings, ...options.selection };
     this.stream = { ...kStreamSettings, ...options.stream };
     this.tree = tileTree(tileset, 'tileset.json');
+    this.fades = new LevelFades(this.tree);
     this.drawing = getDrawing(tileset.representation);
     const { rotation: r, scale, translation: t } = tileset.worldFromScene;
     this.localFromScene.set(
@@ -165,7 +168,7 @@ export class TesseraScene extends THREE.Object3D {
 
   // True when drawing the same view again would give the same image.
   get idle(): boolean {
-    return this.loaded && (this.refused || this.drawer?.wantsAnotherFrame() === false);
+    return this.loaded && (this.refused || (this.drawer?.wantsAnotherFrame() === false && !this.fades.isFading));
   }
 
   // The values that `display` can have, and those that `featureLevel` can have for modes that use it.
@@ -202,12 +205,14 @@ export class TesseraScene extends THREE.Object3D {
     // The background block is drawn only once the coarsest tiles are complete: on slow machines a frame of it alone
     // would only take time.
     const behind = streamer.complete && this.showsBackgroundBlock ? streamer.findResident(backgroundBlock) : undefined;
+    const pieces = this.fade(tiles, look);
     const contents = views.map((view): DrawnPart[] => {
-      const parts = cutFrontToBack(this.tree, cut, view.eye).flatMap((tile): DrawnPart[] => {
-        const content = contentByTile.get(tile);
-        if (content === undefined || !view.sees(this.tree.tiles[tile])) return [];
-        return [{ content: streamer.findResident(content)!, within: tile === content ? undefined : boxOfCells(this.tree, tile) }];
-      });
+      const parts = cutFrontToBack(this.tree, cut, view.eye).flatMap((leaf): DrawnPart[] => (pieces.get(leaf) ?? [])
+        .filter(({ tile }) => view.sees(this.tree.tiles[tile]))
+        .map(({ tile, content, low, high }) => ({
+          content: streamer.findResident(content)!, within: tile === content ? undefined : boxOfCells(this.tree, tile),
+          share: high - low < 1 ? [low, high] : undefined,
+        })));
       return behind ? [...parts, { content: behind }] : parts;
     });
     this.drawn = new Array<number>(this.tileset.levels).fill(0);
@@ -223,7 +228,7 @@ export class TesseraScene extends THREE.Object3D {
     const hasOpaqueDepthChanged = this.opaque.hasChanged || behindThis !== this.lastBehind;
     this.lastBehind = behindThis;
     this.shown = JSON.stringify([
-      [...contentByTile], this.hidden, this.visibility, this.minTransmittance, behind !== undefined, behindThis,
+      [...pieces], this.hidden, this.visibility, this.minTransmittance, behind !== undefined, behindThis,
     ]);
     mesh.visible = drawer.draw({ pictures, worldFromScene, contents, opaqueDepth: depth, hasOpaqueDepthChanged, backgroundContent }, {
       minTransmittance: this.minTransmittance,
@@ -269,6 +274,7 @@ export class TesseraScene extends THREE.Object3D {
 
   // Frees the GPU memory and everything that was fetched; the next update fetches it again.
   leaveGpu(): void {
+    this.fades.reset();
     this.streamer?.dispose();
     this.drawer?.dispose();
     this.opaque.dispose();
@@ -291,6 +297,12 @@ export class TesseraScene extends THREE.Object3D {
     const worldFromScene = this.matrixWorld.clone().multiply(this.localFromScene);
     const { size, pictures } = makePictures(camera, renderer, worldFromScene, this.resolutionScale);
     return pictures.length === 0 ? undefined : { size, pictures, worldFromScene, ...prepared };
+  }
+
+  // Returns what to draw in each visible tile of a cut.
+  private fade(cut: readonly SelectedTile[], { drawer, streamer }: Pick<Look, 'drawer' | 'streamer'>): Map<number, FadedTile[]> {
+    if (!drawer.crossFades) this.fades.reset();
+    return this.fades.next(cut, (tile) => streamer.findResident(tile) !== undefined);
   }
 
   // Selects what to draw of the resident tiles, and advances the loading by one step.

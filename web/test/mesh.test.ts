@@ -154,6 +154,39 @@ describe.skipIf(missing())('a scene of mesh', () => {
     expect(whole.filter((_, i) => isIn(left, i) || isIn(right, i)).length / whole.length).toBeGreaterThan(0.9);
   });
 
+  it('draws a content that fades in its share of the pixels, and the other content in the rest', async () => {
+    const drawShare = async (share: [number, number]) => {
+      await page.evaluate(([one, of]) => {
+        const { drawer } = headlessPage.city as any;
+        const draw = drawer.draw.bind(drawer) as (view: any, settings: any) => boolean;
+        drawer.draw = (all: any, settings: any) => draw({
+          ...all,
+          contents: all.contents.map((parts: any[]) => parts.filter(({ content }) => !content.isBackground).map(({ content }) => ({ content, share: of }))),
+        }, settings);
+        // The same thresholds each time, and no frame before.
+        drawer.last = undefined;
+        drawer.framesInMotion = 0;
+        headlessPage.times(one, 1);
+        delete drawer.draw;
+      }, [above, share] as const);
+      return shown();
+    };
+    await picture(above);
+    const whole = await drawShare([0, 1]);
+    const [first, rest, none] = [await drawShare([0, 0.25]), await drawShare([0.25, 1]), await drawShare([0, 0])];
+    let [ofFirst, ofRest, others] = [0, 0, 0];
+    for (let i = 0; i < whole.length; i += 3) {
+      const isEqual = (a: Uint8Array, b: Uint8Array) => [0, 1, 2].every((c) => Math.abs(a[i + c] - b[i + c]) < 2);
+      if (isEqual(whole, none)) continue;
+      if (isEqual(first, whole) && isEqual(rest, none)) ++ofFirst;
+      else if (isEqual(rest, whole) && isEqual(first, none)) ++ofRest;
+      else ++others;
+    }
+    expect(ofFirst + ofRest).toBeGreaterThan(2000);
+    expect(others / (ofFirst + ofRest)).toBeLessThan(0.01);
+    expect(Math.abs(ofFirst / (ofFirst + ofRest) - 0.25)).toBeLessThan(0.03);
+  });
+
   // Where a box stands just in front of what `pick` returns, it is visible, and just behind it hidden.
   it.each([[0.5, -0.55], [-0.4, -0.6], [0.3, -0.7]])('has its surface where it is picked, at %f, %f', async (x, y) => {
     const without = await picture(atFacade);

@@ -15,6 +15,7 @@ export type DrawnContent = object;
 export interface DrawnPart<Drawn extends DrawnContent = DrawnContent> {
   content: Drawn;
   within?: Box;
+  share?: readonly [number, number]; // drawn in pixels whose threshold lies in [first, second); undefined: in all
 }
 
 // The properties of a scene that its drawing depends on.
@@ -70,6 +71,7 @@ export interface SceneDrawer<
 > extends DrawnPicture {
   readonly bytes: number; // GPU memory without contents
   readonly bytesPerPixel: number; // of its targets
+  readonly crossFades?: boolean; // whether it honours DrawnPart.share
   readonly featureLevels: number; // largest number of fine levels of the contents prepared so far; 0 if there are none
 
   // Returns the GPU bytes of a content once it is resident, without resources.

@@ -26,6 +26,7 @@ const kWeightInMotion = 0.6; // of a frame; docs/benchmarks.md says why
 const kDepthSteps = 4; // between the depths of equal triangles
 const kDepthOrders = 4; // parts that may have equal triangles are few, and offsets must not exceed distances of surfaces
 const kCosineOfCut = 0.96; // a camera that turns by more than 16° between frames has jumped
+const kAllPixels = [0, 1] as const;
 const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 
 type Uniforms = Record<string, THREE.IUniform>;
@@ -62,6 +63,7 @@ interface LastFrame {
 export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMesh> {
   readonly view = { resolution: { value: new THREE.Vector2(1, 1) }, opaqueDepth: { value: null as THREE.Texture | null }, display: { value: 0 } };
   readonly featureLevels = 0;
+  readonly crossFades = true;
   pictures: Picture[] = [];
   private readonly targets: MeshTargets;
   private readonly numbers = new PartNumbers();
@@ -158,7 +160,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
         // The same each time that the content is loaded, so that images are, too.
         layers: { value: 0x10001 * (number + 1) + 0x1000193 * n },
         partOrigin: { value: new THREE.Vector3() }, partStep: { value: part.step },
-        withinLow: { value: new THREE.Vector3() }, withinHigh: { value: new THREE.Vector3() },
+        share: { value: new THREE.Vector2() }, withinLow: { value: new THREE.Vector3() }, withinHigh: { value: new THREE.Vector3() },
         isBackground: { value: backgroundBlock }, hiddenBoxes: { value: 0 },
       };
       const { vertices } = content.texels[n];
@@ -199,7 +201,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   draw({ pictures, contents, opaqueDepth, hasOpaqueDepthChanged }: SceneView<DrawnMesh>, settings: DrawSettings): boolean {
     const key = JSON.stringify([
       pictures.map(({ clipFromScene, part }) => [clipFromScene.elements, part]),
-      contents.map((parts) => parts.map(({ content: { id }, within }) => [id, within])), { ...settings, hidesOthers: false }, opaqueDepth !== null,
+      contents.map((parts) => parts.map(({ content: { id }, within, share }) => [id, within, share])), { ...settings, hidesOthers: false }, opaqueDepth !== null,
     ]);
     const isResting = this.last?.key === key && !hasOpaqueDepthChanged;
     this.pictures = pictures;
@@ -358,8 +360,10 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.uniforms.clipFromReference.value = this.project(picture, frontToBack, isBackground, point);
     const halfSpaces = visibleHalfSpaces(this.uniforms.clipFromReference.value, isParallel(picture.camera));
     const times = new Map<DrawnMeshPart, number>(); // a part may be drawn in several runs, and in place of several tiles
-    for (const { content, within = kEverywhere } of frontToBack) {
+    for (const { content, within = kEverywhere, share = kAllPixels } of frontToBack) {
       if (content.isBackground !== isBackground) continue;
+      // Of two contents that fade into each other, the one that most pixels show gives the solid surface.
+      if (kind !== 'dithered' && !(share[0] <= 0.5 && share[1] > 0.5)) continue;
       const low = new THREE.Vector3(...within.low).sub(point);
       const high = new THREE.Vector3(...within.high).sub(point);
       for (const [order, drawn] of content.parts.entries()) {
@@ -374,6 +378,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
             drawRange(drawn.geometry, run);
             drawn.uniforms.withinLow.value.copy(low);
             drawn.uniforms.withinHigh.value.copy(high);
+            drawn.uniforms.share.value.set(...share);
             mesh.material.uniformsNeedUpdate = true;
           };
           mesh.renderOrder = meshes.length;

@@ -57,10 +57,12 @@ uniform vec3 sceneLow, sceneHigh, withinLow, withinHigh;
 uniform bool isBackground, withinBox;
 uniform int display;
 uniform uint frame;
+uniform vec2 share;  // of the pixels, in which the part is drawn
 uniform int hiddenBoxes;
 uniform mat4 boxFromReference[${2 * kMaxHiddenBoxes}];
 
 const float kSceneEnd = 1e6;
+const uint kFadeLayer = 0xfadeu;  // of the thresholds between contents that fade into each other
 
 // Returns the distance from which on the background block is seen.
 float behindBox(vec3 o, vec3 d) {
@@ -107,7 +109,12 @@ void main() {
   float threshold = display == kShowAlpha ? 0.0 : display == kShowTriangles ? 0.5
     : ditherThreshold(uvec2(gl_FragCoord.xy - part.xy), frame, layer);
   if (opacity <= threshold) discard;
-  visible = uvec2(number | (opacity < 1.0 ? ${kHalfTransparent}u : 0u), floatBitsToUint(distance));
+  bool isFading = share.y - share.x < 1.0;
+  if (isFading) {
+    float between = ditherThreshold(uvec2(gl_FragCoord.xy - part.xy), frame, kFadeLayer);
+    if (between < share.x || between >= share.y) discard;
+  }
+  visible = uvec2(number | (opacity < 1.0 || isFading ? ${kHalfTransparent}u : 0u), floatBitsToUint(distance));
 #ifdef BLOCK_TEXTURES
   featuresFirst = vec4(textureLod(featureTexels, vec3(at, 0.0), 0.0).rg, textureLod(featureTexels, vec3(at, 1.0), 0.0).rg);
   featuresSecond = vec4(textureLod(featureTexels, vec3(at, 2.0), 0.0).rg, textureLod(featureTexels, vec3(at, 3.0), 0.0).rg);
