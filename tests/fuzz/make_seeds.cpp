@@ -126,6 +126,13 @@ int main(int count, char** arguments) {
             R"([{"camera_to_world":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1],"fov":50,"aspect":1.3}]})"));
   write("dataparser_transforms/a",
         std::string(R"({"transform":[[0,1,0,0.3],[1,0,0,-0.1],[0,0,-1,-0.08]],"scale":0.125})"));
+  write("world/a",
+        std::string(
+            R"({"kind":"tessera world","version":2,"scenes":[{"url":"a"},{"url":"b","position":[1,2,3],"scale":2}],)"
+            R"("models":[{"name":"m","files":["m.glb"],"position":[0,0,1],"rotation":[0,0,0,1],"scale":[1,1,1]}],)"
+            R"("hidden":[{"name":"h","middle":[0,0,0],"size":[1,2,3],"turn":0.5}],"files":{"m.glb":"AAAA"},)"
+            R"("bookmarks":[{"name":"b","view":"eye=1,2,3&target=0,0,0&fov=50"}]})"));
+  write("world/b", std::string(R"({"kind":"tessera world","version":1,"scene":{"name":"a","url":"a"}})"));
   write("tileset/a", encodeTileset(tiles_test::testTileset(1)));
   write("tileset/b", encodeTileset(tiles_test::testTileset(2, false)));
   for (uint32_t parts : {1u, 2u}) {

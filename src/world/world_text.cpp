@@ -1,0 +1,81 @@
+#include "world/world_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <charconv>
+
+namespace tessera {
+namespace {
+
+// Returns the value of a digit of base64, or -1.
+int decodeDigit(char c) {
+  if (c >= 'A' && c <= 'Z') return c - 'A';
+  if (c >= 'a' && c <= 'z') return c - 'a' + 26;
+  if (c >= '0' && c <= '9') return c - '0' + 52;
+  return c == '+' ? 62 : c == '/' ? 63 : -1;
+}
+
+}  // namespace
+
+bool isOfNetwork(std::string_view address) {
+  size_t end = 0;
+  while (end < address.size() && (std::isalnum(static_cast<unsigned char>(address[end])) != 0 || address[end] == '+' ||
+                                  address[end] == '-' || address[end] == '.')) {
+    ++end;
+  }
+  const bool hasScheme = end > 1 && end < address.size() && address[end] == ':';
+  return hasScheme || address.starts_with("//") || address.starts_with("\\\\");
+}
+
+std::string decodePercent(std::string_view text) {
+  std::string plain;
+  for (size_t i = 0; i < text.size(); ++i) {
+    unsigned byte = 0;
+    if (text[i] == '%' && i + 2 < text.size()) {
+      const char* digits = text.data() + i + 1;
+      if (const auto [end, error] = std::from_chars(digits, digits + 2, byte, 16);
+          error == std::errc() && end == digits + 2 && byte != 0) {
+        plain += static_cast<char>(byte);
+        i += 2;
+        continue;
+      }
+    }
+    plain += text[i];
+  }
+  return plain;
+}
+
+std::optional<Bytes> decodeBase64(std::string_view text) {
+  Bytes bytes;
+  bytes.reserve(text.size() / 4 * 3 + 3);
+  uint32_t bits = 0;
+  size_t digits = 0, padding = 0;
+  for (const char c : text) {
+    if (std::isspace(static_cast<unsigned char>(c)) != 0) continue;
+    if (c == '=') {
+      if (++padding > 2) return std::nullopt;
+      continue;
+    }
+    const int digit = decodeDigit(c);
+    if (digit < 0 || padding > 0) return std::nullopt;
+    bits = bits << 6 | static_cast<uint32_t>(digit);
+    if (++digits % 4 != 0) continue;
+    for (int shift = 16; shift >= 0; shift -= 8) bytes.push_back(static_cast<std::byte>(bits >> shift & 255));
+  }
+  const size_t rest = digits % 4;
+  if (rest == 1 || (padding > 0 && (rest + padding) % 4 != 0)) return std::nullopt;
+  if (rest >= 2) bytes.push_back(static_cast<std::byte>((rest == 2 ? bits >> 4 : bits >> 10) & 255));
+  if (rest == 3) bytes.push_back(static_cast<std::byte>(bits >> 2 & 255));
+  return bytes;
+}
+
+std::string placeInText(std::string_view text, size_t bytes) {
+  const std::string_view before = text.substr(0, bytes > 0 ? bytes - 1 : 0);
+  const size_t lineBegin = before.rfind('\n') + 1;  // 0 where there is none
+  return fmt::format("line {}, column {}", std::count(before.begin(), before.end(), '\n') + 1,
+                     before.size() - lineBegin + 1);
+}
+
+}  // namespace tessera

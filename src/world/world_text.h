@@ -1,0 +1,21 @@
+// Texts in world.json: addresses, base64, places for errors.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "base/file.h"
+
+namespace tessera {
+
+// Returns whether an address has a scheme, such as https, or names another server.
+bool isOfNetwork(std::string_view address);
+// Replaces %20 and the like by the bytes that they stand for; an invalid sequence stays as it is.
+std::string decodePercent(std::string_view text);
+// Returns nothing if the text is not base64. Line breaks and spaces are ignored.
+std::optional<Bytes> decodeBase64(std::string_view text);
+// Returns the line and column of the last of the first `bytes` bytes, counted in bytes.
+std::string placeInText(std::string_view text, size_t bytes);
+
+}  // namespace tessera
