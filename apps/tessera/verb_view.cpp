@@ -34,7 +34,7 @@ namespace {
 }  // namespace
 
 void addViewVerb(CLI::App& app) {
-  CLI::App* verb = app.add_subcommand("view", "a scene, or a model in training, in a window to move through");
+  CLI::App* verb = app.add_subcommand("view", "a scene, a world, or a model in training, in a window to move through");
   verb->set_help_flag();  // the viewer has flags of its own and answers tessera view --help
   verb->prefix_command();
   verb->callback([verb] { execViewer(verb->remaining()); });

@@ -7,6 +7,7 @@
 
 #include "apps/viewer/async_frame_source.h"
 #include "apps/viewer/gpu_frame_source.h"
+#include "apps/viewer/opened_world.h"
 #include "apps/viewer/reloading_render_source.h"
 #include "base/error.h"
 #include "base/log.h"
@@ -28,10 +29,15 @@ bool isModel(const fs::path& folder) {
 }
 
 // Sets the place's box to the box along the world's axes that encloses a box that is given in other axes.
-template <class ToWorld>
-void setBox(const Vec3d& low, const Vec3d& high, ToWorld toWorld, Place& place) {
+void setBox(const Vec3d& low, const Vec3d& high, const std::function<Vec3d(const Vec3d&)>& toWorld, Place& place) {
   place.low = Vec3d::Constant(INFINITY);
   place.high = Vec3d::Constant(-INFINITY);
+  enclose(low, high, toWorld, place);
+}
+
+}  // namespace
+
+void enclose(const Vec3d& low, const Vec3d& high, const std::function<Vec3d(const Vec3d&)>& toWorld, Place& place) {
   for (int corner = 0; corner < 8; ++corner) {
     Vec3d at;
     for (int axis = 0; axis < 3; ++axis) at[axis] = (corner >> axis & 1) != 0 ? high[axis] : low[axis];
@@ -41,26 +47,21 @@ void setBox(const Vec3d& low, const Vec3d& high, ToWorld toWorld, Place& place) 
   }
 }
 
-}  // namespace
-
 void requireViewable(const fs::path& folder) {
-  if (isScene(folder) || isModel(folder)) return;
-  const std::string name = folder.string();
-  if (!fs::exists(folder)) {
-    throw Error(name, "", "there is no such folder", "name the folder of a scene or of a model");
-  }
-  if (fs::exists(folder / "world.json") || folder.filename() == "world.json") {
-    throw Error(name, "", "is a world, which only browsers show so far", "tessera serve " + name);
-  }
-  throw Error(name, "", "holds neither a scene (tileset.json) nor a model (blocks.json)",
-              "name the folder of a scene or of a model");
+  if (isScene(folder) || isModel(folder) || findWorldFile(folder)) return;
+  const std::string name = folder.string(), remedy = "name the folder of a scene or of a model, or a world.json";
+  if (!fs::exists(folder)) throw Error(name, "", "there is no such folder or file", remedy);
+  throw Error(name, "", "holds neither a scene (tileset.json) nor a model (blocks.json) nor a world (world.json)",
+              remedy);
 }
 
 Place loadPlace(const ViewOptions& options) {
   Place place;
   fs::path views = options.views;
   Mat4d sourceFromWorld;
-  if (isScene(options.folder)) {
+  if (const std::optional<fs::path> file = worldFileToView(options)) {
+    place = loadWorldPlace(readWorldFile(*file), *file, sourceFromWorld);
+  } else if (isScene(options.folder)) {
     const Tileset tileset = readTileset(options.folder);
     const TileFrame frame = makeTileFrame(tileset);
     setBox(
@@ -99,11 +100,12 @@ Place loadPlace(const ViewOptions& options) {
     warn("{}: {}: there are no views of photos", views.string(), other);
     return place;
   }
-  place.views = viewsOfCapture(capture, std::nullopt);
+  for (NamedView& view : viewsOfCapture(capture, std::nullopt)) place.views.push_back(std::move(view));
   return place;
 }
 
 void waitForModel(const fs::path& folder) {
+  if (findWorldFile(folder)) return;
   const ModelFolder model(folder);
   for (bool told = false; !isScene(folder) && !model.manifest();) {
     if (!std::exchange(told, true)) {
@@ -119,12 +121,15 @@ std::unique_ptr<FrameSource> openPictures(const ViewOptions& options, const std:
   const std::string& kind = options.device.kind;
   const bool isMeant =
       parseVulkanDevice(kind) && (!window->isCpu() || kind.starts_with("vulkan:") || !parseVulkanDevice("auto"));
+  GpuRendererSettings settings;
+  settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
+  settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);
+  settings.inBackground = true;
+  settings.draw.exact = false;
+  if (const std::optional<fs::path> file = worldFileToView(options)) {
+    return openWorldPictures(options, *file, window, settings);
+  }
   if (isScene(options.folder) && isMeant) {
-    GpuRendererSettings settings;
-    settings.selection.maximumScreenSpaceError = options.maximumScreenSpaceError;
-    settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);
-    settings.inBackground = true;
-    settings.draw.exact = false;
     return std::make_unique<GpuFrameSource>(openGpuScene(window, options.folder, settings));
   }
   RenderSourceOptions renderSource;

@@ -1,6 +1,7 @@
 // Opens what `tessera view` was given: its location, and the source of its frames.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,8 +14,8 @@
 namespace tessera {
 
 struct ViewOptions {
-  fs::path folder;
-  fs::path views;  // a capture whose photo poses can be visited; empty: those of a model
+  fs::path folder;  // of a scene, a model or a world; or a world file
+  fs::path views;   // a capture whose photo poses can be visited; empty: those of a model
   DeviceOptions device = {.kind = "auto"};
   double memoryMiB = 1024;               // for contents of a scene
   double maximumScreenSpaceError = 1.5;  // see SelectionSettings
@@ -22,14 +23,17 @@ struct ViewOptions {
 
 struct Place {
   Vec3d low = -Vec3d::Ones(), high = Vec3d::Ones();  // box of what can be seen, in the world
-  std::vector<NamedView> views;                      // poses of photos
+  std::vector<NamedView> views;                      // bookmarks of a world, and poses of photos
 };
 
-// Throws Error if the folder holds neither a scene nor a model.
+// Extends the place's box by a box that is given in other axes.
+void enclose(const Vec3d& low, const Vec3d& high, const std::function<Vec3d(const Vec3d&)>& toWorld, Place& place);
+
+// Throws Error if there is neither a scene nor a model nor a world.
 void requireViewable(const fs::path& folder);
-// Reads the box and the photo poses of a scene or model. Throws Error if the box cannot be read, or if the capture that
-// `options.views` names cannot be read or is of another world. If a model's own capture cannot be used, warns and
-// returns no poses.
+// Reads the box and the photo poses of a scene, model or world. Throws Error if the box cannot be read, or if the
+// capture that `options.views` names cannot be read or is of another world. If a model's own capture cannot be used,
+// warns and returns no poses.
 Place loadPlace(const ViewOptions& options);
 
 // If a model in training has not saved anything yet, waits until it has.

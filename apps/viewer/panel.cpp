@@ -22,7 +22,7 @@ void modeButton(const char* name, NavigationMode mode, Navigation& navigation) {
 
 int chooseView(const std::vector<NamedView>& views, int current) {
   int wished = -1;
-  const char* shown = current >= 0 ? views[static_cast<size_t>(current)].name.c_str() : "choose a photo";
+  const char* shown = current >= 0 ? views[static_cast<size_t>(current)].name.c_str() : "choose a view";
   ImGui::SetNextItemWidth(-1);
   if (ImGui::BeginCombo("##view", shown)) {
     for (int i = 0; i < static_cast<int>(views.size()); ++i) {
@@ -78,7 +78,7 @@ PanelAction showPanel(const std::string& title, Navigation& navigation, const st
         "W A S D Q E   move, down, up; Shift: faster\n"
         "1 2 3         map, orbit, fly\n"
         "H             all\n"
-        "N B           next photo, the one before\n"
+        "N B           next view, the one before\n"
         "F1            hide this");
   }
   ImGui::End();

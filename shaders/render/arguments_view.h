@@ -23,8 +23,12 @@ struct ViewArguments {
   FloatPointer colour;       // [pixels][3]
   FloatPointer opacity;
   FloatPointer depth;
+  FloatPointer surface;  // optional, [pixels]: z-depth of the surface, world units; infinite where there is none
+  FloatPointer boxes;    // [boxCount][3][4]: each matrix maps scene units to a hidden box, from -0.5 to 0.5 along each axis
+  uint boxCount;         // boxes in which nothing of the background block is drawn
+  uint boxesOfAll;       // the first of them, in which nothing of other contents is drawn either
 };
-TESSERA_SIZE(ViewArguments, 144);
+TESSERA_SIZE(ViewArguments, 168);
 
 // DenseLayer; the biases follow the weights.
 struct LayerArguments {

@@ -16,4 +16,5 @@ void main() {
   uint pixel;
   if (!pixelIndex(view, pixel)) return;
   for (uint i = 0; i < view.numbersOfPixel; ++i) view.pixels.values[view.numbersOfPixel * pixel + i] = i == 0 ? 1 : 0;
+  if (IS_SET(view.surface)) view.surface.values[pixel] = uintBitsToFloat(0x7f800000u);  // infinite
 }

@@ -66,7 +66,7 @@ struct DrawHashArguments {
   HashPartsPointer parts;
   VectorsPointer vectors;
 };
-TESSERA_SIZE(DrawHashArguments, 272);
+TESSERA_SIZE(DrawHashArguments, 296);
 
 // The networks that turn the sums of all contents into colours.
 struct EndHashArguments {
@@ -77,7 +77,7 @@ struct EndHashArguments {
   uint hasLearnedBackground;
   uint unused;
 };
-TESSERA_SIZE(EndHashArguments, 168);
+TESSERA_SIZE(EndHashArguments, 192);
 
 TESSERA_END_ARGUMENTS
 #endif

@@ -100,6 +100,7 @@ void main() {
   for (int l = 0; l < TABLES; ++l) levelWeights[l] = vec2(a.levelWeights[2 * l], a.levelWeights[2 * l + 1]);
   const Composite sum = marchContent(a.view, pixel, d, toVec3(a.low), toVec3(a.high), a.partCount, a.isBackgroundBlock != 0);
   if (sum.transmittance >= 1) return;
+  storeSurfaceBehind(a.view, pixel, before, sum);
   a.view.pixels.values[first] = before * sum.transmittance;
   a.view.pixels.values[first + 1] += before * sum.depth;
   for (uint c = 0; c < 3; ++c) a.view.pixels.values[first + 2 + c] += before * sum.diffuse[c];

@@ -101,13 +101,14 @@ struct MeshViewArguments {
   // [height][width][2] of the raster: part + 1 (0: none) and triangle; or [4], if fragments are decoded: bits of the colour
   // and of the distance (0: none).
   UintPointer visible;
+  UintPointer solid;    // optional, as `nearest`: of the nearest layer that hides half of what is behind
   UintPointer nearest;  // [height][width]: 1 / depth of the nearest half-transparent layer, bits of a float; 0: none
   float jitter[2];      // offset of what pixels show, in pixels
   uint frame;           // number of the frame, for dithering
   uint unused;
   FloatPointer noise;  // [pixels of the view]: 1 where dithering decides what is visible, otherwise 0
 };
-TESSERA_SIZE(MeshViewArguments, 312);
+TESSERA_SIZE(MeshViewArguments, 344);
 
 #ifdef __cplusplus
 using MeshViewPointer = uint64_t;
@@ -131,7 +132,7 @@ struct BlendFramesArguments {
   float largestDeviation;  // of the history from the mean around the pixel, in standard deviations
   uint unused;
 };
-TESSERA_SIZE(BlendFramesArguments, 248);
+TESSERA_SIZE(BlendFramesArguments, 272);
 
 // The inference of the textures of a part (src/representations/mesh/content/infer_maps.h).
 struct InferMapsArguments {

@@ -63,7 +63,9 @@ bool hitNode(MeshViewArguments a, RayArguments ray, LayerNode node, out Layer la
   // Where the raster has the same pixels, its rule for edges decides: one of two neighbours is hit, and no gap is left.
   if (a.isSamePixels == 0 && hit.isOutside) return false;
   const float near = placed.isBackground != 0 ? ray.nearOfBackground : a.view.near;
-  return hit.distance > near && hit.distance < ray.far && isInCells(placed, hit.distance * ray.direction);
+  const vec3 fromEye = hit.distance * ray.direction;
+  return hit.distance > near && hit.distance < ray.far && isInCells(placed, fromEye) &&
+         !isHidden(a.view, toVec3(a.view.origin) + fromEye, placed.isBackground != 0);
 }
 
 // Collects the nearest layers of a ray behind `last` in order; returns their number.
@@ -99,6 +101,7 @@ void main() {
   ray.direction = rayDirection(a.view, pixel);
   vec3 colour = vec3(0);
   float transmittance = 1, depth = 0;
+  bool hasSurface = false;
   if (ray.direction != vec3(0)) {
     if (!findRasterPixels(a, ray.direction, ray.corner)) return;
     ray.far = farthestDistance(a.view, pixel);
@@ -116,6 +119,10 @@ void main() {
         const PatchPlace around = placeInPatch(placed.part, patchNumber, last.place);
         const float opacity = mixOpacity(placed.part, around);
         if (opacity <= 0) continue;
+        if (opacity >= 0.5 && !hasSurface) {
+          hasSurface = true;
+          storeSurface(a.view, pixel, last.distance);
+        }
         const float weight = transmittance * opacity;
         colour += weight * decode(placed.part, around, harmonics);
         depth += weight * last.distance;

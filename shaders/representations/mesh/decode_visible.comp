@@ -45,6 +45,10 @@ void main() {
       if (!findRasterPosition(a.raster, direction, position)) return;
       at = uvec2(position);
     }
+    if (IS_SET(a.solid)) {
+      const float solid = uintBitsToFloat(a.solid.values[at.y * a.raster.width + at.x]);
+      if (solid > 0) storeSurface(a.view, pixel, 1 / solid);
+    }
     const float nearest = uintBitsToFloat(a.nearest.values[at.y * a.raster.width + at.x]);
 #ifdef DECODED
     const uint first = 4 * (at.y * a.raster.width + at.x);

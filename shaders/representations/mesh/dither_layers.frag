@@ -51,13 +51,17 @@ void main() {
   if (placed.isBackground != 0) near = behindBox(view.value.view, fromEye / distance);
   if (view.value.isSamePixels != 0) far = farthestDistance(view.value.view, rasterPixel);
   if (!(opacity > 0 && distance > near && distance < far && isInCells(placed, fromEye))) discard;
-  // Contents that fade into each other have the same thresholds, so that each pixel shows one of them.
+  if (isHidden(view.value.view, toVec3(view.value.view.origin) + fromEye, placed.isBackground != 0)) discard;
+  // Of two contents that fade into each other, the one that most pixels show gives the solid surface. Stores take place
+  // even if the fragment is hidden.
+  if (opacity >= 0.5 && IS_SET(view.value.solid) && placed.share[0] <= 0.5 && placed.share[1] > 0.5)
+    atomicMax(view.value.solid.values[rasterPixel], floatBitsToUint(1 / distance));
+  // Both have the same thresholds, so that each pixel shows one of them.
   const bool isFading = placed.share[1] - placed.share[0] < 1;
   if (isFading) {
     const float threshold = ditherThreshold(pixel, view.value.frame, kFadeLayer);
     if (threshold < placed.share[0] || threshold >= placed.share[1]) discard;
   }
-  // Stores take place even if the fragment is hidden.
   if (opacity < 1 || isFading) atomicMax(view.value.nearest.values[rasterPixel], floatBitsToUint(1 / distance));
   if (opacity <= ditherThreshold(pixel, view.value.frame, layer)) discard;
 #ifdef DECODES

@@ -45,7 +45,7 @@ struct DrawVolumeArguments {
   LayersPointer layers;
   FloatPointer weights;
 };
-TESSERA_SIZE(DrawVolumeArguments, 216);
+TESSERA_SIZE(DrawVolumeArguments, 240);
 
 TESSERA_END_ARGUMENTS
 #endif

@@ -128,6 +128,7 @@ void main() {
   const float opacity = 1 - sum.transmittance;
   if (opacity <= 0) return;
   const vec3 colour = sum.diffuse + opacity * evaluateSpecular(a, sum, d);
+  storeSurfaceBehind(a.view, pixel, before, sum);
   a.view.pixels.values[first] = before * sum.transmittance;
   a.view.pixels.values[first + 1] += before * sum.depth;
   for (uint c = 0; c < 3; ++c) a.view.pixels.values[first + 2 + c] += before * colour[c];

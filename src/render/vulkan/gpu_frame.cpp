@@ -56,6 +56,28 @@ void GpuFrame::ensureCapacity(const Camera& camera, uint32_t numbersOfPixel) {
   stream_->upload(directions_, 0, std::as_bytes(std::span(directions)));
 }
 
+void GpuFrame::applySurroundings() {
+  const size_t pixels = size_t{view_.width} * view_.height;
+  if (surroundings_.opaqueDepth != 0) view_.opaqueDepth = surroundings_.opaqueDepth;
+  if (surroundings_.wantsSurface) {
+    ensureCapacity(surface_, pixels);
+    view_.surface = surface_.address();
+  }
+  std::vector<float> boxes;
+  for (const auto* some : {&surroundings_.hidden, &surroundings_.hiddenOfBackgroundBlock}) {
+    for (const Mat4d& box : *some) {
+      for (int row = 0; row < 3; ++row)
+        for (int column = 0; column < 4; ++column) boxes.push_back(static_cast<float>(box(row, column)));
+    }
+  }
+  if (boxes.empty()) return;
+  ensureCapacity(boxes_, boxes.size());
+  stream_->upload(boxes_, 0, std::as_bytes(std::span(boxes)));
+  view_.boxes = boxes_.address();
+  view_.boxCount = static_cast<uint32_t>(boxes.size() / 12);
+  view_.boxesOfAll = static_cast<uint32_t>(surroundings_.hidden.size());
+}
+
 void GpuFrame::begin(const TileFrame& frame, float minTransmittance, uint32_t numbersOfPixel,
                      const ViewRequest& request) {
   const Camera& camera = request.camera;
@@ -85,6 +107,7 @@ void GpuFrame::begin(const TileFrame& frame, float minTransmittance, uint32_t nu
     stream_->upload(opaqueDepth_, 0, std::as_bytes(std::span(opaqueDepth->pixels)));
     view_.opaqueDepth = opaqueDepth_.address();
   }
+  applySurroundings();
   view_.pixels = state_.address();
   view_.colour = drawn_.address();
   view_.opacity = view_.colour + 3 * pixels * sizeof(float);
@@ -94,7 +117,7 @@ void GpuFrame::begin(const TileFrame& frame, float minTransmittance, uint32_t nu
 }
 
 GpuRenderedView GpuFrame::onGpu() const {
-  return {camera_.width, camera_.height, view_.colour, view_.opacity};
+  return {camera_.width, camera_.height, view_.colour, view_.opacity, view_.surface};
 }
 
 RenderedView GpuFrame::drawn() {

@@ -52,7 +52,15 @@ void GpuSceneRenderer::queue(const ViewRequest& request, bool exact) {
   }
   DrawSettings settings = settings_.draw;
   settings.exact = exact;
-  drawer_->draw(frame_, tiles_.view(!exact && drawer_->crossFades()), request, settings);
+  SceneView<GpuContent> seen = tiles_.view(!exact && drawer_->crossFades());
+  if (frame_.surroundings().withinBox) {
+    seen.backgroundBlock = nullptr;
+    for (DrawnContent<GpuContent>& drawn : seen.frontToBack) {
+      drawn.low = drawn.low.cwiseMax(seen.frame.low);
+      drawn.high = drawn.high.cwiseMin(seen.frame.high);
+    }
+  }
+  drawer_->draw(frame_, seen, request, settings);
 }
 
 RenderedView GpuSceneRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {
@@ -63,6 +71,13 @@ RenderedView GpuSceneRenderer::render(const Camera& camera, const Pose& worldFro
 GpuRenderedView GpuSceneRenderer::draw(const Camera& camera, const Pose& worldFromCamera) {
   queue({camera, worldFromCamera}, settings_.draw.exact);
   stream_->send();
+  return frame_.onGpu();
+}
+
+GpuRenderedView GpuSceneRenderer::queueAmong(const Camera& camera, const Pose& worldFromCamera,
+                                             GpuSurroundings surroundings, bool exact) {
+  frame_.setSurroundings(std::move(surroundings));
+  queue({camera, worldFromCamera}, exact);
   return frame_.onGpu();
 }
 

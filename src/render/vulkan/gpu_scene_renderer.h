@@ -54,6 +54,9 @@ class GpuSceneRenderer final : public GpuViewRenderer {
 
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override;
   GpuRenderedView draw(const Camera& camera, const Pose& worldFromCamera) override;
+  // Queues an image among the rest of a world, without submitting it. `exact`: as in DrawSettings.
+  GpuRenderedView queueAmong(const Camera& camera, const Pose& worldFromCamera, GpuSurroundings surroundings,
+                             bool exact);
   bool hasMore() const override;
   std::string device() const override { return "vulkan " + stream_->context()->name(); }
   Eigen::Array3f background() const override { return background_; }
@@ -64,6 +67,7 @@ class GpuSceneRenderer final : public GpuViewRenderer {
   SceneState state() const override;
 
   RenderedView lastImage() { return frame_.drawn(); }  // also of draw(); waits for the GPU
+  const TileFrame& frame() const { return tiles_.frame(); }
   const TileCut& cut() const { return tiles_.cut(); }  // of the last image
   const TileChoice& choice() const { return tiles_.choice(); }
   const TileCache<GpuContent>& cache() const { return tiles_.cache(); }

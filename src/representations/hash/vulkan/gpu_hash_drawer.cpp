@@ -92,7 +92,7 @@ class GpuHashDrawer final : public GpuDrawer {
     end.view = frame.view();
     end.networkCount = static_cast<uint32_t>(table.size());
     end.backgroundContent = table.empty() ? 0 : end.networkCount - 1;
-    end.hasLearnedBackground = hasLearnedBackground_;
+    end.hasLearnedBackground = hasLearnedBackground_ && frame.surroundings().endsRays;
     if (!table.empty()) {
       const auto bytes = std::as_bytes(std::span(table));
       if (networkTable_.bytes() < bytes.size()) {

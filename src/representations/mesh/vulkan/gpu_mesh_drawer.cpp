@@ -99,12 +99,13 @@ class GpuMeshDrawer final : public GpuDrawer {
       camera_ = request.camera;
       rasters_ = makeRasterViews(frame.directions(), stream_->context()->limits().maxFramebufferWidth);
     }
-    const bool isChanged = parts_.place(view, view.frame.inScene(request.worldFromCamera.translation));
+    const bool isChanged = parts_.place(view, view.frame.inScene(request.worldFromCamera.translation)) ||
+                           frame.surroundings().hasOpaqueDepthChanged;
     arguments::MeshViewArguments mesh = {};
     mesh.view = frame.view();
     mesh.parts = parts_.address();
     mesh.isSamePixels = rasters_.isSamePixels ? 1 : 0;
-    if (view.backgroundBlock != nullptr) {
+    if (view.backgroundBlock != nullptr && frame.surroundings().endsRays) {
       mesh.sky = static_cast<const GpuMeshContent*>(view.backgroundBlock)->sky;
       mesh.skyEdge = static_cast<const GpuMeshContent*>(view.backgroundBlock)->skyEdge;
     }

@@ -30,7 +30,7 @@ VisibleLayers::~VisibleLayers() {
   for (auto* pass : {&background_, &tiles_, &more_})
     if (*pass) stream_->deferDestroy(std::move(*pass));
   if (image_) stream_->deferDestroy(std::move(image_));
-  for (GpuBuffer* buffer : {&visible_, &nearest_, &view_})
+  for (GpuBuffer* buffer : {&visible_, &nearest_, &solid_, &view_})
     if (*buffer) stream_->deferDestroy(std::move(*buffer));
 }
 
@@ -67,6 +67,8 @@ void VisibleLayers::ensureRaster(ImageSize size) {
     if (nearest_) stream_->deferDestroy(std::move(nearest_));
     nearest_ = GpuBuffer();
     nearest_ = stream_->makeBuffer(bytesOfNearest(size));
+    if (solid_) stream_->deferDestroy(std::move(solid_));
+    solid_ = GpuBuffer();
   }
 }
 
@@ -75,6 +77,12 @@ void VisibleLayers::draw(arguments::MeshViewArguments& view, const PlacedParts& 
   ensureRaster({view.raster.width, view.raster.height});
   view.visible = visible_.address();
   view.nearest = nearest_.address();
+  view.solid = 0;
+  if (view.view.surface != 0) {
+    if (!solid_) solid_ = stream_->makeBuffer(nearest_.bytes());
+    view.solid = solid_.address();
+    stream_->fillZero(solid_, 0, bytesOfNearest(image_->size()));
+  }
   stream_->fillZero(nearest_, 0, bytesOfNearest(image_->size()));
   stream_->upload(view_, 0, std::as_bytes(std::span(&view, 1)));
   drawParts(*stream_, pipeline, view_.address(), parts.ofBackground(), *background_, *more_);

@@ -32,7 +32,7 @@ class VisibleLayers {
   std::shared_ptr<const GpuImage> image_;
   // Of the background block; then of tiles; of further parts of either.
   std::shared_ptr<const GpuRenderPass> background_, tiles_, more_;
-  GpuBuffer visible_, nearest_, view_;
+  GpuBuffer visible_, nearest_, solid_, view_;
 };
 
 }  // namespace tessera
