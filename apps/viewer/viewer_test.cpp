@@ -15,6 +15,8 @@
 #include "eval/psnr.h"
 #include "gpu/presenter.h"
 #include "gpu/testing/test_context.h"
+#include "representations/gpu_world.h"
+#include "world/testing/test_models.h"
 
 namespace tessera {
 namespace {
@@ -91,6 +93,45 @@ TEST_F(ViewerTest, ShowsMeshScenesAsTheCpuDrawsThem) {
   EXPECT_GT(psnr(toFloat(shown("mesh", "cpu")), oracle), 50);
   // The mean of 64 frames, in which many layers of this scene are half transparent.
   EXPECT_GT(psnr(toFloat(shown("mesh", "vulkan")), oracle), 34);
+  EXPECT_EQ(GpuContext::validationMessages(), 0);
+}
+
+TEST_F(ViewerTest, ShowsAWorldWithItsModelsFromABookmark) {
+  fs::create_directory_symlink(fs::path(TESSERA_GOLDEN_SCENES) / "volume", folder_ / "volume");
+  writeFileAtomically(folder_ / "box.glb", std::string_view(testGlb({10, 10, 10}, "1, 0, 0, 1")));
+  const std::string text = R"({"kind": "tessera world", "version": 2, "scenes": [{"url": "volume"}],
+    "models": [{"name": "box", "files": ["box.glb"], "position": [0, -45, 8], "rotation": [0, 0, 0, 1],
+                "scale": [1, 1, 1]}],
+    "bookmarks": [{"name": "From the south", "view": "eye=10,-120,70&target=10,-20,5&fov=50"}]})";
+  writeFileAtomically(folder_ / "world.json", std::string_view(text));
+  ViewOptions view;
+  view.folder = folder_.path();
+  view.maximumScreenSpaceError = 0;
+  WindowOptions window;
+  window.width = kWidth;
+  window.height = kHeight;
+  window.panels = false;
+  window.from = "south";
+  window.screenshot = folder_ / "shown.png";
+  runViewer(view, window);
+  const ImageU8 seen = readImage(window.screenshot).image;
+  const Place place = loadPlace(view);
+  ASSERT_EQ(place.views.size(), 1u);
+  GpuRendererSettings settings;
+  settings.selection.maximumScreenSpaceError = 0;
+  const auto world =
+      openGpuWorld(openForTest(), readWorldFile(folder_ / "world.json"), folder_ / "world.json", settings);
+  const double focal = 0.5 * kHeight / std::tan(25 * std::numbers::pi / 180);
+  const Camera camera = {kWidth, kHeight, LensModel::pinhole, {focal, focal, 0.5 * kWidth, 0.5 * kHeight}};
+  const ImageU8 expected =
+      toBytes(compositeOver(world->render(camera, place.views[0].worldFromCamera), world->background()));
+  EXPECT_GT(psnr(toFloat(seen), toFloat(expected)), 40);
+  size_t red = 0;
+  for (size_t p = 0; p < seen.pixelCount(); ++p)
+    red += seen.pixels[3 * p] > 150 && seen.pixels[3 * p + 1] < 100 ? 1 : 0;
+  EXPECT_GT(red, 300u);
+  view.device = {"cpu", 2};
+  EXPECT_THROW(runViewer(view, window), Error);
   EXPECT_EQ(GpuContext::validationMessages(), 0);
 }
 
