@@ -108,6 +108,9 @@ TEST_F(MeshCommandLine, TrainsPartsApartBakesAndRendersASyntheticCity) {
   const json forUnreal = told({"export", at("scene"), at("unreal"), "--format", "unreal", "--json"});
   EXPECT_EQ(forUnreal.at("triangles"), triangles);
   EXPECT_EQ(forUnreal.at("decoders"), forUnreal.at("parts")) << "each block has a decoder of its own";
+  const Said unopened = run({"export", at("scene"), at("viewed"), "--format", "mobilenerf", "--level", "1"});
+  EXPECT_EQ(unopened.exitCode, 1);
+  EXPECT_TRUE(contains(unopened.err, "_phone")) << unopened.err;
   const Said split = run({"export", at("scene"), at("unreal"), "--format", "unreal", "--split"});
   EXPECT_EQ(split.exitCode, 1);
   EXPECT_TRUE(contains(split.err, "has no meaning for the format unreal")) << split.err;

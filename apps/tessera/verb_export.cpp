@@ -8,6 +8,7 @@
 #include "base/error.h"
 #include "export/gltf.h"
 #include "export/merf.h"
+#include "export/mobilenerf.h"
 #include "export/unreal.h"
 
 namespace tessera {
@@ -62,6 +63,22 @@ Json runUnrealExport(const ExportFlags& flags) {
           {"triangles", exported.triangles}};
 }
 
+Json runMobilenerfExport(const ExportFlags& flags) {
+  const MobilenerfExport exported = exportMobilenerf(flags.scene, flags.out, {.level = flags.level});
+  if (!flags.json) {
+    fmt::print("{}: {:.1f} MB, {} triangles in {} shapes; one network for {} gives colours {:.1f} dB from theirs\n",
+               flags.out, static_cast<double>(exported.bytesOnDisk) / 1e6, exported.triangles, exported.shapes,
+               exported.decoders == 1 ? "the decoder" : fmt::format("{} decoders", exported.decoders),
+               exported.refit.psnr);
+  }
+  return {{"bytes_on_disk", exported.bytesOnDisk},
+          {"level", flags.level},
+          {"shapes", exported.shapes},
+          {"decoders", exported.decoders},
+          {"triangles", exported.triangles},
+          {"refit", {{"rms", exported.refit.rms}, {"psnr", exported.refit.psnr}, {"colours", exported.refit.colours}}}};
+}
+
 void requireFormat(const ExportFlags& flags, const char* flag, bool isGiven,
                    std::initializer_list<const char*> formats) {
   if (!isGiven || std::find(formats.begin(), formats.end(), flags.format) != formats.end()) return;
@@ -81,21 +98,22 @@ void addExportVerb(CLI::App& app) {
   verb->add_option(
           "--format", flags->format,
           "gltf: ordinary triangles of a mesh scene; merf: what the public web viewer of MERF reads, of a "
-          "volume scene baked of one contracted block; unreal: neural textures of a mesh scene, and a script that "
-          "imports them into Unreal Engine")
+          "volume scene baked of one contracted block; mobilenerf: what the public web viewer of MobileNeRF reads, of "
+          "a mesh scene; unreal: neural textures of a mesh scene, and a script that imports them into Unreal Engine")
       ->required()
-      ->check(CLI::IsMember({"gltf", "merf", "unreal"}));
+      ->check(CLI::IsMember({"gltf", "merf", "mobilenerf", "unreal"}));
   const CLI::Option* level =
-      verb->add_option("--level", flags->level, "gltf, unreal: level of detail; 0 is the finest");
+      verb->add_option("--level", flags->level, "gltf, mobilenerf, unreal: level of detail; 0 is the finest");
   verb->add_flag("--split", flags->split, "gltf: a folder with one file for each tile");
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   verb->callback([flags, level] {
-    requireFormat(*flags, "--level", level->count() > 0, {"gltf", "unreal"});
+    requireFormat(*flags, "--level", level->count() > 0, {"gltf", "mobilenerf", "unreal"});
     requireFormat(*flags, "--split", flags->split, {"gltf"});
     Json result = {{"format", flags->format}};
-    result.update(flags->format == "gltf"     ? runGltfExport(*flags)
-                  : flags->format == "unreal" ? runUnrealExport(*flags)
-                                              : runMerfExport(*flags));
+    result.update(flags->format == "gltf"         ? runGltfExport(*flags)
+                  : flags->format == "mobilenerf" ? runMobilenerfExport(*flags)
+                  : flags->format == "unreal"     ? runUnrealExport(*flags)
+                                                  : runMerfExport(*flags));
     if (flags->json) fmt::print("{}\n", result.dump(2));
   });
 }
