@@ -44,6 +44,10 @@
 #   flight       a city of 4x4 blocks, barely trained, in a flight of 600 steps with a quarter of the finest level's memory, through
 #                Vulkan with stored and with inferred maps, and in the browser with stored ones: never over the budget, never
 #                blank; and the first image of the scene of `maps` in the browser, on networks of several speeds
+#   mobilenerf   only with JAX3D: that scene as `tessera export --format mobilenerf` writes it, in the viewer of MobileNeRF's authors, in
+#                the same browser at that viewer's own size, 1256x828: images against those on the CPU, the frame times of both viewers
+#                in turns, and bytes. JAX3D is a copy of https://github.com/google-research/jax3d, whose page
+#                jax3d/projects/mobilenerf/view_unbounded.html is shown unchanged, with three.js of its time (npm's three 0.151.3)
 #   fallback     the ordinary glTF meshes in the contents of that scene's finest level, in Blender, assimp and three.js: they load with
 #                the same numbers of triangles; and held-out views of three.js and Blender, without mipmaps and antialiasing, against
 #                the scene without view dependence (every hit has the base colour of its texels), the scene as it is, an
@@ -57,6 +61,7 @@
 # What a pixel shows is known from the generator of the city (mesh_classes.cpp).
 # Resumable: everything is kept in build/bench/mesh, and what exists is not made again; remove traversal-* there to repeat a row.
 #   [ROWS="traversal city levels …"] [SEEDS="1 2 3"] [MODEL=DIR] [CAPTURE=DIR] [TESSERA_SHARED_DATA=DIR] bench/mesh.sh
+#   JAX3D=DIR ROWS=mobilenerf [VIEWS=5] [ONLY=images|frames] bench/mesh.sh
 # CAPTURE: the capture of MODEL, if it is not where its blocks.json says.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -163,6 +168,14 @@ block_bytes() {
       select(.cells[0] >= $i * $edge and .cells[2] <= ($i + 1) * $edge and
              .cells[1] >= $j * $edge and .cells[3] <= ($j + 1) * $edge)] |
       ([.[].bytes] | add) + ([.[].resources // [] | .[]] | unique | map($scene.resources[.].bytes) | add // 0)] | max' \
+    "$work/$1/tileset.json"
+}
+
+# level_bytes SCENE [LEVEL]: the megabytes of the contents of a level with the background block, or of all levels.
+level_bytes() {
+  jq --argjson level "${2:-null}" '[.root | recurse(.children[]?) | (.extensions.TESSERA_scene.level // 0) as $tile |
+    (.contents // [.content // empty])[] | .extensions.TESSERA_scene |
+    select($level == null or (if .background_block then .level // 0 else $tile end) == $level) | .bytes] | add / 1e6' \
     "$work/$1/tileset.json"
 }
 
@@ -827,6 +840,34 @@ yardstick() {
     "$(shortfall "$(jq .scene.psnr "$file")" "$(jq .mean.psnr "$file")")" '>=' 0
 }
 
+mobilenerf() {
+  need_tessera
+  local html=jax3d/projects/mobilenerf/view_unbounded.html folder=$work/mobilenerf root=$PWD viewer
+  [ -e "${JAX3D:?names no folder; it must be a copy of https://github.com/google-research/jax3d}/$html" ] || die "$JAX3D: has no $html"
+  viewer=$(realpath "$JAX3D")
+  [ -e "$work/city/transforms.json" ] || "$tessera" synth city "$work/city" --blocks 2x2
+  trained city-mesh city --method mesh --minutes 15
+  counted city-mesh city
+  tools/install-debian-packages.sh --browser
+  tools/build-web.sh
+  mkdir -p "$folder"
+  if [ ! -d "$folder/three" ]; then
+    (cd "$folder" && npm pack --silent three@0.151.3 > /dev/null && tar xzf three-0.151.3.tgz && mv package three)
+  fi
+  if [ ! -s "$folder/export.json" ]; then
+    "$tessera" export "$work/city-mesh.scene" "$folder/city_phone" --format mobilenerf --json > "$folder/export.part"
+    mv "$folder/export.part" "$folder/export.json"
+  fi
+  jq -r '"exported: \(.triangles) triangles in \(.shapes) shapes, \(.bytes_on_disk / 1e6) MB; one network in place of \(.decoders) " +
+    "decoders gives colours \(.refit.psnr) dB from theirs"' "$folder/export.json"
+  echo "the scene on disk: finest level with background block $(level_bytes city-mesh.scene 0) MB, all levels $(level_bytes city-mesh.scene) MB," \
+    "both with ordinary meshes, but without their textures"
+  (cd web && SCENE="$root/$work/city-mesh.scene" EXPORTED="$root/$folder/city_phone" CAPTURE="$root/$work/city" JAX3D="$viewer" \
+    THREE_OF_VIEWER="$root/$folder/three" OUT="$root/$folder/pictures" TESSERA=$(realpath "$root/$tessera") \
+    xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" \
+    npx vitest run bench/mobilenerf.ts --config vitest.bench.config.ts --disable-console-intercept)
+}
+
 # imported NAME DOWNSCALE: real photographs.
 imported() {
   need_tessera
@@ -868,7 +909,7 @@ photos() {
 fox() { photos fox 2 27.2 --blocks 1x1; }
 beach() { photos brighton_beach 4 19.1; }
 
-for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan frames browser maps flight fallback gltf yardstick fox beach}; do
+for row in ${ROWS:-traversal city levels final holes losses alpha preset quads depth views traffic borders processes killed memory vulkan frames browser maps flight fallback gltf yardstick fox beach${JAX3D:+ mobilenerf}}; do
   "$row"
 done
 finish

@@ -7,7 +7,7 @@ import type { Tileset } from '../src/tiles/tileset';
 import { kFieldOfView, kHeight, kWidth } from './views';
 
 // Returns a camera path in nerfstudio's format, in the world of the photos' source; matrices are row-major.
-export function cameraPath(tileset: Tileset, matrices: number[][]): string {
+export function cameraPath(tileset: Tileset, matrices: number[][], width = kWidth, height = kHeight): string {
   const s = tileset.sourceFromWorld;
   const scale = Math.hypot(s[0], s[1], s[2]);
   const camera_path = matrices.map((m) => {
@@ -17,10 +17,10 @@ export function cameraPath(tileset: Tileset, matrices: number[][]): string {
         return column < 3 ? sum / scale : sum + s[12 + row];
       }),
     );
-    return { camera_to_world: [...rows.flat(), 0, 0, 0, 1], fov: kFieldOfView, aspect: kWidth / kHeight };
+    return { camera_to_world: [...rows.flat(), 0, 0, 0, 1], fov: kFieldOfView, aspect: width / height };
   });
   return JSON.stringify({
-    camera_type: 'perspective', render_width: kWidth, render_height: kHeight, fps: matrices.length, seconds: 1, camera_path,
+    camera_type: 'perspective', render_width: width, render_height: height, fps: matrices.length, seconds: 1, camera_path,
   });
 }
 
