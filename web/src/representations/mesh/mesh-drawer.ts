@@ -75,6 +75,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   private readonly uniforms: Uniforms; // of triangles and passes
   private readonly passes: Record<'sky' | 'blend' | 'copy', TriangleMesh>;
   private readonly decoders: TriangleMesh[] = []; // of each shape of networks
+  private readonly inspectors: TriangleMesh[] = []; // the same for display modes, compiled when they are shown
   private readonly prepared = new Map<string, TriangleMesh>(); // keeps programs alive
   private lastId = 0;
   private last?: LastFrame;
@@ -168,7 +169,8 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       return [{ part, row, shape, geometry, chunks: makeChunks(vertices), uniforms, meshes: {} }];
     });
     this.numbers.shapes.slice(this.decoders.length).forEach((network) => {
-      const decoder = this.makePass(decodeShader(this.decoders.length, network));
+      const decoder = this.makePass(decodeShader(this.decoders.length, network, false));
+      this.inspectors.push(this.makePass(decodeShader(this.decoders.length, network, true)));
       this.decoders.push(decoder);
       this.renderer.compile(decoder, this.anyCamera);
     });
@@ -253,7 +255,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.numbers.dispose();
     this.screen.dispose();
     this.nothingOpaque.dispose();
-    for (const { material } of [...Object.values(this.passes), ...this.decoders, ...this.prepared.values()]) material.dispose();
+    for (const { material } of [...Object.values(this.passes), ...this.decoders, ...this.inspectors, ...this.prepared.values()]) material.dispose();
   }
 
   private makePass(shader: string): TriangleMesh {
@@ -287,7 +289,8 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     const { dithered, decoded, output } = this.targets;
     const point = this.place(picture, frontToBack, hidden);
     const isLayers = settings.display === 'layers';
-    if (!isLayers) this.drawTriangles(picture, frontToBack, 'dithered', dithered, point);
+    const isInspected = settings.display !== 'colour' && settings.display !== 'depth';
+    if (!isLayers) this.drawTriangles(picture, frontToBack, isInspected ? 'inspected' : 'dithered', dithered, point);
     decoded.viewport.copy(picture.part);
     this.renderer.setRenderTarget(decoded);
     if (number === 0) this.renderer.clear();
@@ -300,7 +303,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
         this.run(this.passes.sky, decoded, [picture]);
       }
       const shapes = new Set(frontToBack.flatMap(({ content }) => content.parts.map(({ shape }) => shape)));
-      for (const shape of shapes) this.run(this.decoders[shape], decoded, [picture]);
+      for (const shape of shapes) this.run((isInspected ? this.inspectors : this.decoders)[shape], decoded, [picture]);
     }
     const before = this.last?.pictures[number];
     const hasHistory = before !== undefined && before.forward.dot(viewDirection(picture)) > kCosineOfCut;
@@ -363,7 +366,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     for (const { content, within = kEverywhere, share = kAllPixels } of frontToBack) {
       if (content.isBackground !== isBackground) continue;
       // Of two contents that fade into each other, the one that most pixels show gives the solid surface.
-      if (kind !== 'dithered' && !(share[0] <= 0.5 && share[1] > 0.5)) continue;
+      if ((kind === 'solid' || kind === 'layers') && !(share[0] <= 0.5 && share[1] > 0.5)) continue;
       const low = new THREE.Vector3(...within.low).sub(point);
       const high = new THREE.Vector3(...within.high).sub(point);
       for (const [order, drawn] of content.parts.entries()) {

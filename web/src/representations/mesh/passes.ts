@@ -47,8 +47,9 @@ void main() {
   colour = vec4(textureLod(sky, texel / vec2(textureSize(sky, 0)), 0.0).rgb, 1.0);
 }`;
 
-// Colours the pixels of parts whose networks have a shape.
-export function decodeShader(shape: number, network: DenseLayer[]): string {
+// Colours the pixels of parts whose networks have a shape. `isInspected`: as a display mode shows them. That is a program
+// of its own, because drivers for the CPU evaluate all branches.
+export function decodeShader(shape: number, network: DenseLayer[], isInspected: boolean): string {
   const features = [...Array(kFeatures).keys()].map((f) => `f${f >> 2}.${'xyzw'[f & 3]}`);
   const harmonics = kHarmonics.slice(0, network[0].inputs - kFeatures);
   const evaluate = (name: string, ofDirection: string[]) => {
@@ -58,6 +59,7 @@ export function decodeShader(shape: number, network: DenseLayer[]): string {
     ].join('\n');
   };
   return `${kHead}
+${isInspected ? '#define INSPECTED' : ''}
 ${kModeConstants}
 ${kPartNumbersSource}
 out vec4 colour;
@@ -65,7 +67,9 @@ uniform usampler2D visible;
 uniform sampler2D featuresFirst, featuresSecond;
 uniform int display;
 ${evaluate('decode', harmonics.map((one) => `(${one})`))}
+#ifdef INSPECTED
 ${evaluate('withoutDirection', harmonics.map((_, i) => (i === 0 ? kHarmonics[0] : '0.0')))}
+#endif
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   int number = int(texelFetch(visible, at, 0).x & ${kHalfTransparent - 1}u) - 1;
@@ -75,6 +79,7 @@ void main() {
   vec4 first = texelFetch(featuresFirst, at, 0), second = texelFetch(featuresSecond, at, 0);
   vec4 f0 = partVector(number, 0) + partVector(number, 2) * first, f1 = partVector(number, 1) + partVector(number, 3) * second;
   vec3 d = normalize(ray * vec3(pixelNdc(), 1.0));
+#ifdef INSPECTED
   vec3 seen;
   if (display == kShowFeatures || display == kShowTriangles || display == kShowAlpha) {
     seen = first.rgb;
@@ -86,6 +91,9 @@ void main() {
     vec3 tint = display == kShowBlocks ? ofBlock.rgb : partVector(number, 5).rgb;
     if (display == kShowBlocks || display == kShowLevels) seen = tint * (0.35 + 0.65 * dot(seen, vec3(0.3, 0.6, 0.1)));
   }
+#else
+  vec3 seen = decode(number, f0, f1, d);
+#endif
   colour = vec4(seen, 1.0);
 }`;
 }

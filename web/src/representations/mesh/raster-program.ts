@@ -106,8 +106,11 @@ void main() {
 #else
   bool isSecond = place.x + place.y > 1.0;
   uint number = uint(patchLayout.z), layer = layers + 2u * uint(patchNumber) + (isSecond ? 1u : 0u);
-  float threshold = display == kShowAlpha ? 0.0 : display == kShowTriangles ? 0.5
-    : ditherThreshold(uvec2(gl_FragCoord.xy - part.xy), frame, layer);
+  float threshold = ditherThreshold(uvec2(gl_FragCoord.xy - part.xy), frame, layer);
+#ifdef INSPECTED
+  if (display == kShowAlpha) threshold = 0.0;
+  if (display == kShowTriangles) threshold = 0.5;
+#endif
   if (opacity <= threshold) discard;
   bool isFading = share.y - share.x < 1.0;
   if (isFading) {
@@ -122,6 +125,7 @@ void main() {
   featuresFirst = textureLod(featureTexels, vec3(at, 0.0), 0.0);
   featuresSecond = textureLod(featureTexels, vec3(at, 1.0), 0.0);
 #endif
+#ifdef INSPECTED
   if (display == kShowAlpha) featuresFirst.rgb = vec3(opacity);
   if (display == kShowTriangles) {
     vec3 normal = normalize(cross(dFdx(fromReference), dFdy(fromReference)));
@@ -130,14 +134,17 @@ void main() {
     featuresFirst.rgb = mix(vec3(0.75), tint, 0.3) * (0.25 + 0.75 * abs(dot(normal, d)));
   }
 #endif
+#endif
 }`;
 
-export type RasterKind = 'dithered' | 'solid' | 'layers';
+// `inspected`: dithered, as a display mode shows them.
+export type RasterKind = 'dithered' | 'inspected' | 'solid' | 'layers';
 
 // Returns the material of a part, without uniforms. Programs depend on the kind and the form of textures alone.
 export function rasterMaterial(kind: RasterKind, isCompressed: boolean): THREE.RawShaderMaterial {
   const defines: Record<string, string> = {};
   if (kind === 'solid') defines.SOLID = '';
+  if (kind === 'inspected') defines.INSPECTED = '';
   if (kind === 'layers') defines.LAYERS = '';
   if (isCompressed) defines.BLOCK_TEXTURES = '';
   return new THREE.RawShaderMaterial({
