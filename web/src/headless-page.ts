@@ -54,14 +54,15 @@ function setCamera(camera: THREE.PerspectiveCamera, { matrix, fx, fy, cx, cy, wi
 
 // Waits for the GPU, as pages that run ahead of it queue frames that nobody sees.
 function draw(city: TesseraScene, camera: THREE.Camera): void {
-  if (headlessPage.beside) updateScenes([city, headlessPage.beside], camera, renderer);
+  if (headlessPage.others.length > 0) updateScenes([city, ...headlessPage.others], camera, renderer);
   else city.update(camera, renderer);
   renderer.render(world, camera);
   gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
 }
 
 function shownScenes(): TesseraScene[] {
-  return headlessPage.beside ? [headlessPage.city!, headlessPage.beside].filter(({ visible }) => visible) : [headlessPage.city!];
+  const { city, others } = headlessPage;
+  return others.length > 0 ? [city!, ...others].filter(({ visible }) => visible) : [city!];
 }
 
 // Updates until the visible scenes are in a state.
@@ -76,7 +77,7 @@ async function until(state: 'loaded' | 'idle', step: () => void, end: number): P
 const headlessPage = {
   THREE, renderer, world, camera,
   city: undefined as TesseraScene | undefined,
-  beside: undefined as TesseraScene | undefined, // a second scene in the same world
+  others: [] as TesseraScene[], // further scenes in the same world
   errors: [] as string[],
 
   gpu(): string {
@@ -91,12 +92,17 @@ const headlessPage = {
     world.add(this.city);
   },
 
-  // Opens a second scene in the same world, at an offset from the first in the capture's world.
+  get beside(): TesseraScene | undefined {
+    return this.others[0];
+  },
+
+  // Opens a further scene in the same world, at an offset from the first in the capture's world.
   async openBeside(url: string, away: number[], options: SceneOptions = {}): Promise<void> {
-    this.beside = await TesseraScene.load(url, options);
-    this.beside.showsBackgroundBlock = false;
-    this.beside.position.fromArray(away).applyMatrix4(kYUpFromZUp);
-    world.add(this.beside);
+    const scene = await TesseraScene.load(url, options);
+    scene.showsBackgroundBlock = false;
+    scene.position.fromArray(away).applyMatrix4(kYUpFromZUp);
+    this.others.push(scene);
+    world.add(scene);
   },
 
   close(): void {
