@@ -49,7 +49,7 @@ std::vector<int> provedRows(const std::string& subject) {
 }
 
 TEST(Invariants, AreEachProvedByExistingTests) {
-  EXPECT_EQ(provedRows("every representation"), (std::vector<int>{1, 2, 3, 4}));
+  EXPECT_EQ(provedRows("every representation"), (std::vector<int>{1, 2, 3, 4, 5}));
   EXPECT_EQ(provedRows("`volume`"), (std::vector<int>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15}));
   EXPECT_EQ(provedRows("`hash`"),
             (std::vector<int>{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19}));
