@@ -370,5 +370,28 @@ TEST_F(VolumeCommandLine, ExplainsWhatIsWrongWithModelsAndScenes) {
   explained(run({"render", broken.string(), at("never"), "--views", at("city")}), "tileset.json");
 }
 
+TEST_F(VolumeCommandLine, RendersAWorldByVulkanAndExplainsWhatIsWrongWithIt) {
+  const fs::path file = folder_ / "worlds/world.json";
+  const auto rendered = [&](const std::string& device, const std::string& url) {
+    const json world = {{"kind", "tessera world"},
+                        {"version", 2},
+                        {"scenes", {{{"url", url}}, {{"url", url}, {"position", {30, 0, 0}}, {"visible", false}}}}};
+    writeFileAtomically(file, std::string_view(world.dump()));
+    const std::string out = at("world-" + device);
+    return run({"render", file.string(), out, "--views", at("city"), "--size", "32x24", "--device", device});
+  };
+  scene();
+  const Said onCpu = rendered("cpu", "../scene");
+  EXPECT_EQ(onCpu.exitCode, 1);
+  EXPECT_TRUE(contains(onCpu.err, "drawn by Vulkan only")) << onCpu.err;
+  const Said lacking = rendered("cpu", "gone");
+  EXPECT_EQ(lacking.exitCode, 1);
+  EXPECT_TRUE(contains(lacking.err, "world.json: scenes[0].url: there is no scene in")) << lacking.err;
+  const Said drawn = rendered("vulkan", "../scene");
+  if (contains(drawn.err, "no Vulkan")) GTEST_SKIP() << drawn.err;
+  EXPECT_EQ(drawn.exitCode, 0) << drawn.err;
+  EXPECT_TRUE(fs::exists(fs::path(at("world-vulkan")) / "images/photo_0000.png"));
+}
+
 }  // namespace
 }  // namespace tessera

@@ -2,7 +2,9 @@
 
 #include "apps/tessera/model_source.h"
 #include "apps/tessera/scene_source.h"
+#include "apps/tessera/world_source.h"
 #include "base/error.h"
+#include "world/world_file.h"
 
 namespace tessera {
 namespace {
@@ -14,7 +16,9 @@ bool holdsScene(const fs::path& folder) {
 }  // namespace
 
 void requireSceneFor(const RenderSourceOptions& options, const fs::path& folder) {
-  if (holdsScene(folder) || !fs::exists(folder) || (options.level == 0 && options.memoryMiB == 0)) return;
+  if (holdsScene(folder) || findWorldFile(folder) || !fs::exists(folder) ||
+      (options.level == 0 && options.memoryMiB == 0))
+    return;
   throw Error(folder.string(), options.level != 0 ? "--lod" : "--memory-mib", "applies to scenes, and this is none",
               "leave it out, or bake the model");
 }
@@ -22,6 +26,7 @@ void requireSceneFor(const RenderSourceOptions& options, const fs::path& folder)
 std::unique_ptr<RenderSource> openRenderSource(Device& device, const fs::path& folder,
                                                const RenderSourceOptions& options) {
   if (holdsScene(folder)) return openScene(device, folder, options);
+  if (const std::optional<fs::path> file = findWorldFile(folder)) return openWorld(device, *file, options);
   return openModel(device, folder);
 }
 

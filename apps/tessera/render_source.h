@@ -1,4 +1,4 @@
-// What a MODEL|SCENE argument names: something that can be rendered.
+// What a MODEL|SCENE argument names: something that can be rendered; also a world.
 #pragma once
 
 #include <memory>
@@ -35,9 +35,9 @@ struct RenderSourceOptions {
 // scenes.
 void requireSceneFor(const RenderSourceOptions& options, const fs::path& folder);
 
-// Throws Error if the folder holds neither a model nor a scene, if the scene has no such level, or if its coarsest
-// level does not fit into memory. Warns if an image was rendered coarser than requested because memory was short. Keeps
-// a reference to `device`.
+// `folder`: of a model, a scene or a world; or a world file. Throws Error if it holds none, if the scene has no such
+// level, or if its coarsest level does not fit into memory. Warns if an image was rendered coarser than requested
+// because memory was short. Keeps a reference to `device`.
 std::unique_ptr<RenderSource> openRenderSource(Device& device, const fs::path& folder,
                                                const RenderSourceOptions& options);
 

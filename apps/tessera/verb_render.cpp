@@ -22,11 +22,11 @@ struct RenderFlags {
 void addRenderVerb(CLI::App& app) {
   auto flags = std::make_shared<RenderFlags>();
   CLI::App* verb =
-      app.add_subcommand("render", "images of a model or scene: PNGs into a folder, or an .mp4 through ffmpeg");
+      app.add_subcommand("render", "images of a model, scene or world: PNGs into a folder, or an .mp4 through ffmpeg");
   verb->footer(
       "Examples:\n  tessera render fox.model frames/ --views fox.capture\n"
       "  tessera render fox.model flight.mp4 --path camera_path.json --size 1280x720");
-  verb->add_option("model", flags->model, "model or scene folder")->required();
+  verb->add_option("model", flags->model, "model or scene folder, or world.json")->required();
   verb->add_option("out", flags->out, "folder for PNGs, or a file ending in .mp4")->required();
   CLI::Option* views = verb->add_option("--views", flags->views, "render the views of this capture");
   CLI::Option* path =
