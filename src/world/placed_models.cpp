@@ -36,8 +36,15 @@ const Bytes* findEmbedded(const World& world, const WorldModel& model, const std
 std::optional<Bytes> readFileOfModel(const World& world, const WorldModel& model, const fs::path& folder,
                                      const std::string& path) {
   if (const Bytes* embedded = findEmbedded(world, model, path)) return *embedded;
+  // Files that only the model names must lie in the folder: models come from anywhere.
+  const auto isNamed = [&](const std::string& name) { return plainPath(name) == plainPath(path); };
+  fs::path file = folder / path;
+  if (std::none_of(model.files.begin(), model.files.end(), isNamed)) {
+    const std::optional<fs::path> inside = resolveInside(folder, path);
+    if (!inside) return std::nullopt;
+    file = *inside;
+  }
   std::error_code status;
-  const fs::path file = folder / path;
   if (!fs::is_regular_file(file, status) || fs::file_size(file, status) > ModelLimits().fileBytes) return std::nullopt;
   return readFile(file, ModelLimits().fileBytes);
 }
@@ -59,7 +66,7 @@ PlacedModels readPlacedModels(const World& world, const fs::path& worldFile) {
     }
     const auto [number, isNew] = numbers.try_emplace(model.files, all.models.size());
     if (isNew) {
-      const fs::path folder = worldFile.parent_path();
+      const fs::path folder = fs::absolute(worldFile).parent_path();
       const ModelFileReader reader = [&](const std::string& path) {
         return readFileOfModel(world, model, folder, path);
       };

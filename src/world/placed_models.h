@@ -22,8 +22,8 @@ struct PlacedModels {
 };
 
 // Reads the visible models of a world from its embedded files and from paths relative to the folder of `worldFile`.
-// Warns about textures that are missing. Throws Error as readModel does, and if all models together exceed its limits
-// fourfold.
+// What a model names besides the files that the world lists for it must lie in that folder. Warns about textures that
+// are missing. Throws Error as readModel does, and if all models together exceed its limits fourfold.
 PlacedModels readPlacedModels(const World& world, const fs::path& worldFile);
 
 }  // namespace tessera
