@@ -697,7 +697,7 @@ flight() {
   flown() {
     (cd web && SMALL_SCENE="$root/$work/city-mesh.scene" SMALL_CAPTURE="$root/$work/city" LARGE_SCENE=$1 \
       FINEST_BYTES=$("$root/$tessera" info "$1" --json | jq .level_0.bytes_in_memory) \
-      TESSERA=$(realpath "$root/$tessera") xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" \
+      CONTENTS_ALONE=1 TESSERA=$(realpath "$root/$tessera") xvfb-run -a -s "-screen 0 1280x1024x24 -noreset" \
       npx vitest run bench/viewer.ts -t "$2" --config vitest.bench.config.ts --disable-console-intercept)
   }
   flown "$root/$work/city-stored.scene" "first picture"

@@ -58,7 +58,7 @@ void requireViewable(const fs::path& folder) {
 Place loadPlace(const ViewOptions& options) {
   Place place;
   fs::path views = options.views;
-  Mat4d sourceFromWorld;
+  Mat4d sourceFromWorld = Mat4d::Identity();
   if (const std::optional<fs::path> file = worldFileToView(options)) {
     place = loadWorldPlace(readWorldFile(*file), *file, sourceFromWorld);
   } else if (isScene(options.folder)) {

@@ -40,17 +40,19 @@ Place loadWorldPlace(const World& world, const fs::path& worldFile, Mat4d& sourc
   bool hasMain = false;
   for (size_t i = 0; i < world.scenes.size(); ++i) {
     const WorldScene& scene = world.scenes[i];
-    if (!scene.isVisible) continue;
+    const bool isMain = !hasMain && !scene.placement;
+    if (!scene.isVisible && !isMain) continue;
     const Tileset tileset = readTileset(resolveScene(worldFile, scene, fmt::format("scenes[{}]", i)));
+    if (isMain) {
+      sourceFromWorld = tileset.sourceFromWorld;
+      hasMain = true;
+    }
+    if (!scene.isVisible) continue;
     TileFrame frame = makeTileFrame(tileset);
     if (scene.placement) frame = placeFrame(frame, *scene.placement);
     enclose(
         frame.low, frame.high,
         [&](const Vec3d& x) { return Vec3d(frame.translation + frame.scale * (frame.rotation * x)); }, place);
-    if (!hasMain && !scene.placement) {
-      sourceFromWorld = tileset.sourceFromWorld;
-      hasMain = true;
-    }
   }
   if (place.low.x() > place.high.x()) {
     throw Error(worldFile.string(), "scenes", "are all invisible", "set \"visible\" of one to true");

@@ -21,6 +21,7 @@ std::unique_ptr<WorldRenderer> openGpuWorld(const std::shared_ptr<const GpuConte
   }
   GpuRendererSettings share = settings;
   share.budgetBytes = settings.budgetBytes / static_cast<uint64_t>(visible);
+  share.poolBytes = settings.poolBytes / static_cast<uint64_t>(visible);
   const auto stream = std::make_shared<GpuStream>(context);
   std::vector<WorldRenderer::Scene> scenes;
   Eigen::Array3f background = Eigen::Array3f::Zero();

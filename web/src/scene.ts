@@ -237,8 +237,8 @@ export class TesseraScene extends THREE.Object3D {
       featureLevel: this.featureLevel,
       framesAtRest: this.framesAtRest,
       antialiases: this.antialiases,
-      // Something else may be visible behind the scene even if it ends no rays.
       hidesOthers: this.opaque.hidesBehindScene,
+      // Something else may be visible behind the scene even if it ends no rays.
       endsRays: this.showsBackgroundBlock && this.visibility === Infinity && this.neighbours.behind.length === 0,
       hidden: inScene(this.hidden),
       hiddenOfBackgroundBlock: inScene(this.neighbours.boxes),

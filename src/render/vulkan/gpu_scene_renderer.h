@@ -68,6 +68,7 @@ class GpuSceneRenderer final : public GpuViewRenderer {
 
   RenderedView lastImage() { return frame_.drawn(); }  // also of draw(); waits for the GPU
   const TileFrame& frame() const { return tiles_.frame(); }
+  bool isFading() const { return tiles_.isFading(); }  // of the last image: contents fade into others
   const TileCut& cut() const { return tiles_.cut(); }  // of the last image
   const TileChoice& choice() const { return tiles_.choice(); }
   const TileCache<GpuContent>& cache() const { return tiles_.cache(); }

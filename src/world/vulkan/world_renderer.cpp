@@ -16,6 +16,7 @@ namespace {
 
 constexpr size_t kNumbersOfPixel = 5;  // colour, opacity, depth
 constexpr uint32_t kGroup = 64;        // local_size of the kernels
+constexpr uint32_t kMaxGroups = 4096;  // each has several pixels of large images
 
 Mat4d similarity(const Mat3d& turnedAndScaled, const Vec3d& translation) {
   Mat4d matrix = Mat4d::Identity();
@@ -106,7 +107,7 @@ void WorldRenderer::ensureCapacity(const Camera& camera) {
 void WorldRenderer::queue(const Camera& camera, const Pose& worldFromCamera, bool exact) {
   ensureCapacity(camera);
   const uint32_t pixels = static_cast<uint32_t>(width_) * static_cast<uint32_t>(height_);
-  const Groups groups = {(pixels + kGroup - 1) / kGroup};
+  const Groups groups = {workgroups(pixels, kGroup, kMaxGroups)};
   arguments::BeginWorldArguments begun = {};
   begun.image.colour = image_.address();
   begun.image.opacity = begun.image.colour + uint64_t{3} * pixels * sizeof(float);
@@ -127,6 +128,7 @@ void WorldRenderer::queue(const Camera& camera, const Pose& worldFromCamera, boo
   bool hasChanged = false;
   for (size_t place = 0; place < order.size(); ++place) {
     PlacedScene& scene = scenes_[order[place]];
+    const bool wasFading = scene.renderer->isFading();
     if (!isSame || hasChanged || scene.drawn.colour == 0 || scene.renderer->hasMore()) {
       GpuSurroundings around = surroundingsAt(order, place);
       around.opaqueDepth = begun.image.depth;
@@ -138,7 +140,8 @@ void WorldRenderer::queue(const Camera& camera, const Pose& worldFromCamera, boo
     stream_->run(addScene_, std::as_bytes(std::span(&added, 1)), groups);
     const TileCacheStatistics statistics = scene.renderer->state().cache;
     const uint64_t changes = statistics.loads + statistics.evictions;
-    hasChanged |= changes != scene.changes;
+    // Which of two contents that fade gives the surface changes without loading.
+    hasChanged |= changes != scene.changes || wasFading || scene.renderer->isFading();
     scene.changes = changes;
   }
 }

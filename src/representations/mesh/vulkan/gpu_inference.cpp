@@ -125,9 +125,13 @@ const GpuInference::Encoder& GpuInference::ensure(const std::shared_ptr<const Sh
   return encoders_.front();
 }
 
-bool GpuInference::infer(const MeshContent& content, const GpuMeshContent& onGpu) {
-  for (const auto& encoder : content.encoders)
-    if (countEncoderBytes(encoder->encoder) > budget_) return false;
+bool GpuInference::fits(const MeshContent& content) const {
+  return std::all_of(content.encoders.begin(), content.encoders.end(),
+                     [this](const auto& encoder) { return countEncoderBytes(encoder->encoder) <= budget_; });
+}
+
+void GpuInference::infer(const MeshContent& content, const GpuMeshContent& onGpu) {
+  CHECK(fits(content) == true);
   size_t number = 0;
   for (const PatchSet& part : content.parts) {
     if (part.patches == 0) continue;
@@ -143,7 +147,6 @@ bool GpuInference::infer(const MeshContent& content, const GpuMeshContent& onGpu
     stream_->run(kernels_.get(kInferMapsSpirv, encoder.maxWidth), std::as_bytes(std::span(&all, 1)),
                  {.x = workgroups(all.blocks, kBlocksPerGroup, kMaxGroups)});
   }
-  return true;
 }
 
 }  // namespace tessera

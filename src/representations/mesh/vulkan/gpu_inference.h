@@ -24,9 +24,12 @@ class GpuInference {
   void setBudget(uint64_t bytes);
   uint64_t memoryBytes() const { return bytes_; }  // never more than the budget
 
-  // Queues the inference of the textures of all parts that have an encoder. `onGpu` was made from `content`, whose
-  // textures need not exist. Returns false, and queues nothing, if an encoder alone exceeds the budget.
-  bool infer(const MeshContent& content, const GpuMeshContent& onGpu);
+  // Returns whether each encoder alone is within the budget. May be called by several threads at a time, but not during
+  // setBudget().
+  bool fits(const MeshContent& content) const;
+  // Queues the inference of the textures of all parts that have an encoder. `onGpu` was made from `content`, which fits
+  // and whose textures need not exist.
+  void infer(const MeshContent& content, const GpuMeshContent& onGpu);
 
  private:
   struct Encoder {

@@ -17,9 +17,9 @@ class GpuInferenceTest : public testing::Test {
   }
   void TearDown() override { EXPECT_EQ(GpuContext::validationMessages(), 0); }
 
-  bool infer(GpuInference& inference, const MeshContent& content) {
-    const GpuMeshContent onGpu(stream_, content);
-    return inference.infer(content, onGpu);
+  void infer(GpuInference& inference, const MeshContent& content) {
+    ASSERT_TRUE(inference.fits(content));
+    inference.infer(content, GpuMeshContent(stream_, content));
   }
 
   std::shared_ptr<const GpuContext> context_;
@@ -29,12 +29,12 @@ class GpuInferenceTest : public testing::Test {
 TEST_F(GpuInferenceTest, KeepsEncodersWithinItsBudget) {
   const MeshContent first = tiles_test::inferredMeshContent(1), second = tiles_test::inferredMeshContent(2);
   GpuInference inference(stream_);
-  ASSERT_TRUE(infer(inference, first));
+  infer(inference, first);
   const uint64_t one = inference.memoryBytes();
   EXPECT_GE(one, 2 * first.encoders[0]->encoder.table.size());
-  ASSERT_TRUE(infer(inference, first));  // with the encoder that is there
+  infer(inference, first);  // with the encoder that is there
   EXPECT_EQ(inference.memoryBytes(), one);
-  ASSERT_TRUE(infer(inference, second));
+  infer(inference, second);
   EXPECT_EQ(inference.memoryBytes(), 2 * one);
   EXPECT_EQ(first.encoders[0].use_count(), 2);  // in main memory, too
 
@@ -42,7 +42,7 @@ TEST_F(GpuInferenceTest, KeepsEncodersWithinItsBudget) {
   EXPECT_EQ(inference.memoryBytes(), one);
   EXPECT_EQ(first.encoders[0].use_count(), 1);  // the one that was not used for longer has given way
   EXPECT_EQ(second.encoders[0].use_count(), 2);
-  ASSERT_TRUE(infer(inference, first));
+  infer(inference, first);
   EXPECT_EQ(inference.memoryBytes(), one);
   EXPECT_EQ(second.encoders[0].use_count(), 1);
 }
@@ -50,8 +50,8 @@ TEST_F(GpuInferenceTest, KeepsEncodersWithinItsBudget) {
 TEST_F(GpuInferenceTest, RefusesAnEncoderThatExceedsItsBudget) {
   GpuInference inference(stream_);
   inference.setBudget(1000);
-  EXPECT_FALSE(infer(inference, tiles_test::inferredMeshContent(1)));
-  EXPECT_EQ(inference.memoryBytes(), 0u);
+  EXPECT_FALSE(inference.fits(tiles_test::inferredMeshContent(1)));
+  EXPECT_TRUE(inference.fits(tiles_test::randomMeshContent(1)));
 }
 
 }  // namespace

@@ -68,10 +68,9 @@ class GpuMeshDrawer final : public GpuDrawer {
   uint64_t residentBytesOfResource(uint64_t) const override { return 0; }
 
   std::unique_ptr<Content> prepare(std::unique_ptr<Content> content) const override {
-    if (infersOnGpu()) return content;
     auto* decoded = dynamic_cast<ContentOf<MeshContent>*>(content.get());
     CHECK(decoded != nullptr);
-    if (!decoded->value.encoders.empty()) {
+    if (!decoded->value.encoders.empty() && !(infersOnGpu() && inference_.fits(decoded->value))) {
       const std::lock_guard lock(inferring_);
       inferMapsOnCpu(decoded->value, 0);
     }
@@ -81,16 +80,11 @@ class GpuMeshDrawer final : public GpuDrawer {
   std::unique_ptr<GpuContent> upload(const Content& content) override {
     const MeshContent& mesh = contentAs<MeshContent>(content);
     auto onGpu = std::make_unique<GpuMeshContent>(stream_, mesh);
-    if (mesh.encoders.empty() || !infersOnGpu() || inference_.infer(mesh, *onGpu)) return onGpu;
-    MeshContent inferred = mesh;
-    inferMapsOnCpu(inferred, 0);
-    return std::make_unique<GpuMeshContent>(stream_, inferred);
+    if (!mesh.encoders.empty() && infersOnGpu() && inference_.fits(mesh)) inference_.infer(mesh, *onGpu);
+    return onGpu;
   }
 
-  void setPoolBudget(uint64_t bytes) override {
-    inference_.setBudget(bytes / 2);
-    lists_.setBudget(bytes / 2);
-  }
+  void setPoolBudget(uint64_t bytes) override { inference_.setBudget(bytes); }
 
   void draw(GpuFrame& frame, const SceneView<GpuContent>& view, const ViewRequest& request,
             const DrawSettings& settings) override {

@@ -41,15 +41,6 @@ LayerLists::~LayerLists() {
     if (*buffer) stream_->deferDestroy(std::move(*buffer));
 }
 
-void LayerLists::setBudget(uint64_t bytes) {
-  const uint64_t fragments = std::max<uint64_t>(1, bytes / sizeof(arguments::LayerNode));
-  largestCapacity_ = static_cast<uint32_t>(std::min<uint64_t>(fragments, largestCapacity_));
-  if (capacity_ <= largestCapacity_) return;
-  stream_->deferDestroy(std::move(nodes_));
-  nodes_ = GpuBuffer();
-  capacity_ = 0;
-}
-
 void LayerLists::ensureRaster(ImageSize size) {
   const std::shared_ptr<const GpuContext>& context = stream_->context();
   if (!pipeline_) {

@@ -17,9 +17,6 @@ class LayerLists {
   LayerLists(const LayerLists&) = delete;
   LayerLists& operator=(const LayerLists&) = delete;
 
-  // Limits the memory of the lists in bytes, from the next image on.
-  void setBudget(uint64_t bytes);
-
   // Lists the fragments of all parts in the raster of `view`, whose lists it sets, and calls `composite` with the rows
   // that are complete: several times if all fragments do not fit into memory. Waits for the GPU. Throws Error if the
   // device does not rasterise, or if a single row does not fit.
