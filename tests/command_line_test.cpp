@@ -591,7 +591,8 @@ TEST_F(CommandLine, ViewIsAnsweredByAProgramOfItsOwn) {
   const Said missing = run({"view", at("missing")});
   EXPECT_EQ(missing.exitCode, 1);
   EXPECT_EQ(missing.err, "tessera: error: " + at("missing") +
-                             ": there is no such folder; name the folder of a scene or of a model\n");
+                             ": there is no such folder or file; name the folder of a scene or of a model, or a "
+                             "world.json\n");
   EXPECT_EQ(run({"view"}).exitCode, 2);
   EXPECT_EQ(run({"view", city(), "--size", "wide"}).exitCode, 2);
   const Said capture = run({"view", city()});
