@@ -23,7 +23,8 @@ struct PlacedModels {
 
 // Reads the visible models of a world from its embedded files and from paths relative to the folder of `worldFile`.
 // What a model names besides the files that the world lists for it must lie in that folder. Warns about textures that
-// are missing. Throws Error as readModel does, and if all models together exceed its limits fourfold.
+// are missing. Throws Error as readModel does, and if the triangles of all models together exceed
+// its limit fourfold; the texels of all models together have no limit.
 PlacedModels readPlacedModels(const World& world, const fs::path& worldFile);
 
 }  // namespace tessera
