@@ -13,12 +13,14 @@ struct ModelMaterialArguments {
   float cutoff;
   float metalness;
   float roughness;
-  uint texture;  // number + 1; 0: none
+  uint texture;          // number + 1; 0: none
+  uint surfaceTexture;   // likewise
+  uint emissionTexture;  // likewise
   uint isDoubleSided;
   uint isLit;
   uint unused;
 };
-TESSERA_SIZE(ModelMaterialArguments, 56);
+TESSERA_SIZE(ModelMaterialArguments, 64);
 
 struct ModelTextureArguments {
   UintPointer texels;  // of all levels, the largest first: red, green, blue and opacity from the lowest byte on

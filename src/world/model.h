@@ -1,4 +1,4 @@
-// Ordinary models (glTF, GLB, OBJ, FBX) as triangles with materials, read by assimp.
+// Ordinary models (glTF, GLB, OBJ, FBX) as triangles with materials.
 #pragma once
 
 #include <array>
@@ -29,6 +29,8 @@ struct ModelMaterial {
   float metalness = 0, roughness = 0.8f;
   std::array<float, 3> emission = {};  // linear
   int texture = -1;                    // multiplies base colour and opacity; -1: none
+  int surfaceTexture = -1;             // its green multiplies the roughness, its blue the metalness; -1: none
+  int emissionTexture = -1;            // multiplies the emission; -1: none
   bool isDoubleSided = false;
   bool isLit = true;  // if false, it looks the same in any light
 };
@@ -37,7 +39,7 @@ struct Model {
   std::vector<ModelVertex> vertices;
   std::vector<uint32_t> corners;  // of triangles, anticlockwise as seen from the front
   std::vector<ModelMaterial> materials;
-  std::vector<ImageU8> textures;     // 4 channels, sRGB
+  std::vector<ImageU8> textures;     // 4 channels; sRGB, but linear as surfaceTexture
   std::vector<std::string> lacking;  // textures that were not provided, or cannot be decoded
 };
 

@@ -112,14 +112,26 @@ TEST(Model, IsRefusedWithAReasonWhateverItsFileHolds) {
                                          {"a.glb", testGlb({1, 1, 1}, "1, 0, 0, 1")},
                                          {"a.fbx", testFbx({1, 1, 1})},
                                          {"a.obj", obj}}) {
-    for (size_t size = 0; size < whole.size(); size += 1 + whole.size() / 60) {
+    size_t refusals = 0, readings = 0;
+    for (size_t size = 0; size < whole.size(); size += 1 + whole.size() / 60, ++readings) {
       try {
         readFrom({{path, whole.substr(0, size)}}, path);
       } catch (const Error& error) {
         EXPECT_EQ(error.subject(), path);
+        ++refusals;
       }
     }
+    // The start of an OBJ is often one itself.
+    EXPECT_GE(refusals, path == "a.obj" ? 1 : readings * 9 / 10) << path;
+    EXPECT_EQ(reasonOfRefusal({{path, whole}}, path), "");
   }
+}
+
+TEST(Model, IsRefusedIfItsReaderCrashes) {
+  std::string nested = "; FBX 7.3.0 project file\nFBXHeaderExtension:  {\nFBXVersion: 7300\n}\nObjects:  ";
+  for (size_t i = 0; i < 500'000; ++i) nested += "{\nA: ";
+  const std::string reason = reasonOfRefusal({{"a.fbx", nested}}, "a.fbx");
+  EXPECT_TRUE(reason.starts_with("cannot be read: it ")) << reason;
 }
 
 }  // namespace

@@ -71,6 +71,21 @@ std::optional<Bytes> decodeBase64(std::string_view text) {
   return bytes;
 }
 
+bool isDataUri(std::string_view address) {
+  const std::string_view scheme = "data:";
+  return address.size() >= scheme.size() &&
+         std::equal(scheme.begin(), scheme.end(), address.begin(),
+                    [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); });
+}
+
+std::optional<Bytes> decodeDataUri(std::string_view address) {
+  const std::string_view base64 = ";base64";
+  const size_t comma = address.find(',');
+  if (!isDataUri(address) || comma == std::string_view::npos) return std::nullopt;
+  if (!address.substr(0, comma).ends_with(base64)) return std::nullopt;
+  return decodeBase64(address.substr(comma + 1));
+}
+
 std::string placeInText(std::string_view text, size_t bytes) {
   const std::string_view before = text.substr(0, bytes > 0 ? bytes - 1 : 0);
   const size_t lineBegin = before.rfind('\n') + 1;  // 0 where there is none

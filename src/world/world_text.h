@@ -15,6 +15,9 @@ bool isOfNetwork(std::string_view address);
 std::string decodePercent(std::string_view text);
 // Returns nothing if the text is not base64. Line breaks and spaces are ignored.
 std::optional<Bytes> decodeBase64(std::string_view text);
+bool isDataUri(std::string_view address);
+// Returns the content of an address that states it (data:…;base64,…); nothing if it is not base64.
+std::optional<Bytes> decodeDataUri(std::string_view address);
 // Returns the line and column of the last of the first `bytes` bytes, counted in bytes.
 std::string placeInText(std::string_view text, size_t bytes);
 

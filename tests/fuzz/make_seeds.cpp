@@ -16,6 +16,7 @@
 #include "tiles/glb.h"
 #include "tiles/testing/test_tileset.h"
 #include "tiles/tileset_json.h"
+#include "world/testing/test_models.h"
 
 using namespace tessera;
 
@@ -50,6 +51,29 @@ ImageU8 picture(int channels) {
   ImageU8 image(9, 7, channels);
   for (size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] = static_cast<uint8_t>(i * 37);
   return image;
+}
+
+// A model with a map of every kind, sparse and normalised accessors, and a strip.
+std::string texturedGltf() {
+  const Bytes png = encodePng(picture(3));
+  const std::string image = testBase64({reinterpret_cast<const char*>(png.data()), png.size()});
+  const std::string texture = R"({"index":0,"texCoord":0,"extensions":{"KHR_texture_transform":{"offset":[0.5,0],)"
+                              R"("scale":[2,1],"rotation":0.5}}})";
+  return R"({"asset":{"version":"2.0"},"nodes":[{"mesh":0,"rotation":[0,0,0,1],"translation":[1,2,3]}],)"
+         R"("meshes":[{"primitives":[{"mode":5,"material":0,"indices":3,"attributes":)"
+         R"({"POSITION":0,"NORMAL":1,"TEXCOORD_0":2,"COLOR_0":1}}]}],"accessors":[)"
+         R"({"componentType":5126,"count":4,"type":"VEC3","sparse":{"count":1,"indices":{"bufferView":0,)"
+         R"("componentType":5121},"values":{"bufferView":0}}},)"
+         R"({"bufferView":0,"componentType":5120,"normalized":true,"count":4,"type":"VEC3"},)"
+         R"({"bufferView":0,"componentType":5123,"normalized":true,"count":4,"type":"VEC2"},)"
+         R"({"bufferView":0,"byteOffset":4,"componentType":5121,"count":4,"type":"SCALAR"}],)"
+         R"("bufferViews":[{"buffer":0,"byteLength":24}],"buffers":[{"byteLength":24,"uri":"data:;base64,)" +
+         testBase64(std::string("\1\2\3\4\0\1\2\3", 8) + std::string(16, '\1')) +
+         R"("}],"images":[{"uri":"data:image/png;base64,)" + image +
+         R"("}],"textures":[{"source":0}],"materials":[{"pbrMetallicRoughness":{"baseColorTexture":)" + texture +
+         R"(,"metallicRoughnessTexture":)" + texture + R"(},"emissiveTexture":)" + texture +
+         R"(,"emissiveFactor":[1,1,1],"alphaMode":"MASK","extensions":{"KHR_materials_transmission":)"
+         R"({"transmissionFactor":0.5},"KHR_materials_emissive_strength":{"emissiveStrength":2}}}]})";
 }
 
 // An EXIF block with a latitude, from which the fuzzer finds the other tags.
@@ -132,6 +156,9 @@ int main(int count, char** arguments) {
             R"("models":[{"name":"m","files":["m.glb"],"position":[0,0,1],"rotation":[0,0,0,1],"scale":[1,1,1]}],)"
             R"("hidden":[{"name":"h","middle":[0,0,0],"size":[1,2,3],"turn":0.5}],"files":{"m.glb":"AAAA"},)"
             R"("bookmarks":[{"name":"b","view":"eye=1,2,3&target=0,0,0&fov=50"}]})"));
+  write("gltf_model/a", testGltf({1, 2, 3}, "1, 0, 0, 0.5"));
+  write("gltf_model/b", testGlb({1, 2, 3}, "1, 0, 0, 0.5"));
+  write("gltf_model/c", texturedGltf());
   write("world/b", std::string(R"({"kind":"tessera world","version":1,"scene":{"name":"a","url":"a"}})"));
   write("tileset/a", encodeTileset(tiles_test::testTileset(1)));
   write("tileset/b", encodeTileset(tiles_test::testTileset(2, false)));

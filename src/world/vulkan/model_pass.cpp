@@ -90,6 +90,8 @@ ModelPass::Uploaded ModelPass::upload(const Model& model) {
     to.metalness = material.metalness;
     to.roughness = material.roughness;
     to.texture = static_cast<uint32_t>(material.texture + 1);
+    to.surfaceTexture = static_cast<uint32_t>(material.surfaceTexture + 1);
+    to.emissionTexture = static_cast<uint32_t>(material.emissionTexture + 1);
     to.isDoubleSided = material.isDoubleSided ? 1 : 0;
     to.isLit = material.isLit ? 1 : 0;
   }

@@ -132,5 +132,49 @@ TEST_F(ModelPassTest, LightsWhatFacesTheSunMoreAndMinifiesTextures) {
   EXPECT_NEAR(colourAt(drawn(model), 30, 32).mean(), 150 / 255.0, 0.02);
 }
 
+TEST_F(ModelPassTest, ReadsRoughnessAndMetalnessAsNumbersAndEmissionAsAColour) {
+  Model model = southernSquare();
+  model.materials[0].isLit = true;
+  model.materials[0].metalness = 1;
+  const float metal = colourAt(drawn(model), 32, 32).mean();
+  model.materials[0].metalness = 0;
+  const float paint = colourAt(drawn(model), 32, 32).mean();
+  ASSERT_GT(std::abs(metal - paint), 0.05f);
+  model.materials[0].metalness = 1;
+  model.materials[0].surfaceTexture = 0;
+  ImageU8& surface = model.textures.emplace_back(4, 4, 4, 255);
+  for (size_t p = 0; p < surface.pixelCount(); ++p) surface.pixels[4 * p + 2] = 128;
+  const auto linear = [](float x) { return std::pow((x + 0.055f) / 1.055f, 2.4f); };
+  const Eigen::Array3f half = colourAt(drawn(model), 32, 32);
+  model.materials[0].surfaceTexture = -1;
+  const Eigen::Array3f whole = colourAt(drawn(model), 32, 32);
+  model.materials[0].metalness = 0;
+  const Eigen::Array3f none = colourAt(drawn(model), 32, 32);
+  for (int c = 0; c < 3; ++c) EXPECT_NEAR(linear(half[c]), 0.5f * (linear(whole[c]) + linear(none[c])), 0.01f) << c;
+  // A black surface that glows.
+  model.materials[0].baseColour = {0, 0, 0};
+  model.materials[0].isLit = false;
+  model.materials[0].emission = {1, 1, 0};
+  model.materials[0].emissionTexture = 0;
+  for (size_t p = 0; p < model.textures[0].pixelCount(); ++p) model.textures[0].pixels[4 * p] = 100;
+  const Eigen::Array3f glow = 255 * colourAt(drawn(model), 32, 32);
+  EXPECT_LT((glow - Eigen::Array3f(100, 255, 0)).abs().maxCoeff(), 1.5f) << glow;
+}
+
+TEST_F(ModelPassTest, DrawsPlacesThatAreNegativeOrNoNumbers) {
+  Model model = southernSquare();
+  model.materials[0].texture = 0;
+  ImageU8& image = model.textures.emplace_back(8, 8, 4, 255);
+  for (int y = 0; y < 8; ++y)
+    for (int x = 0; x < 8; ++x) *image.at(x, y) = x < 4 ? 200 : 0;
+  const RenderedView straight = drawn(model);
+  Model shifted = model;
+  for (ModelVertex& vertex : shifted.vertices) vertex.place[0] -= 3;
+  const RenderedView view = drawn(shifted);
+  for (int x = 18; x < 46; ++x) EXPECT_NEAR(colourAt(view, x, 30)[0], colourAt(straight, x, 30)[0], 0.01f) << x;
+  for (ModelVertex& vertex : shifted.vertices) vertex.place[0] = std::nanf("");
+  EXPECT_EQ(*drawn(shifted).opacity.at(32, 32), 1);
+}
+
 }  // namespace
 }  // namespace tessera
