@@ -21,10 +21,10 @@ struct PlacedModels {
   std::vector<PlacedModel> placed;
 };
 
-// Reads the visible models of a world from its embedded files and from paths relative to the folder of `worldFile`.
-// What a model names besides the files that the world lists for it must lie in that folder. Warns about textures that
-// are missing. Throws Error as readModel does, and if the triangles of all models together exceed
-// its limit fourfold; the texels of all models together have no limit.
-PlacedModels readPlacedModels(const World& world, const fs::path& worldFile);
+// Reads the visible models of a world from its embedded files and from paths relative to the folder of `worldFile`, as
+// world/model_files.h says. Warns about textures that are missing. Throws Error as readModel does, if a file that the
+// world lists has an absolute path or is too large, and if the triangles or the texels of all models together exceed
+// the limits of one model fourfold. No model is read once these are exceeded, so that memory is bounded.
+PlacedModels readPlacedModels(const World& world, const fs::path& worldFile, const ModelLimits& limits = {});
 
 }  // namespace tessera

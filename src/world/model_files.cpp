@@ -1,0 +1,101 @@
+#include "world/model_files.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/error.h"
+#include "world/world_text.h"
+
+namespace tessera {
+
+std::string plainPath(const std::string& path) {
+  std::string plain = path;
+  std::replace(plain.begin(), plain.end(), '\\', '/');
+  return fs::path(plain).lexically_normal().generic_string();
+}
+
+std::array<std::string, 3> FileIndex::keys(const std::string& path) {
+  std::string lower = path;
+  for (char& c : lower)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return {path, lower, lower.substr(lower.rfind('/') + 1)};
+}
+
+void FileIndex::add(const std::string& name, const Bytes* embedded) {
+  const std::string path = plainPath(name);
+  const std::array<std::string, 3> all = keys(path);
+  for (size_t k = 0; k < all.size(); ++k) numbers_[k][all[k]].push_back(entries_.size());
+  entries_.push_back({path, embedded});
+}
+
+std::vector<const FileIndex::Entry*> FileIndex::findAlike(const std::string& name) const {
+  std::vector<const Entry*> alike;
+  const std::array<std::string, 3> all = keys(plainPath(name));
+  for (size_t k = 0; k < all.size(); ++k) {
+    const auto known = numbers_[k].find(all[k]);
+    if (known == numbers_[k].end()) continue;
+    for (const size_t number : known->second) alike.push_back(&entries_[number]);
+  }
+  return alike;
+}
+
+const Bytes* FileIndex::findEmbedded(const std::string& name) const {
+  const std::array<std::string, 3> all = keys(plainPath(name));
+  for (size_t k = 0; k < 2; ++k)
+    if (const auto known = numbers_[k].find(all[k]); known != numbers_[k].end()) {
+      return entries_[known->second.front()].embedded;
+    }
+  return nullptr;
+}
+
+FileIndex indexEmbedded(const World& world) {
+  FileIndex index;
+  for (const auto& [name, bytes] : world.files) index.add(name, &bytes);
+  return index;
+}
+
+ModelFiles::ModelFiles(const FileIndex& embedded, const WorldModel& model, const fs::path& folder, uint64_t maxBytes)
+    : embedded_(embedded), folder_(folder), maxBytes_(maxBytes) {
+  for (const std::string& name : model.files) {
+    if (!isOfNetwork(name)) listed_.add(name, embedded.findEmbedded(name));
+  }
+}
+
+std::optional<Bytes> ModelFiles::read(const std::string& path) {
+  const std::string names[] = {path, decodePercent(path)};
+  for (const std::string& name : names) {
+    if (auto bytes = readListed(listed_, name)) return bytes;
+    if (auto bytes = readListed(embedded_, name)) return bytes;
+  }
+  for (const std::string& name : names) {
+    const std::optional<fs::path> inside = resolveInside(folder_, plainPath(name));
+    if (!inside) continue;
+    if (auto bytes = readDisk(*inside)) return bytes;
+  }
+  return std::nullopt;
+}
+
+void ModelFiles::requireSmallFiles() const {
+  if (!tooLarge_) return;
+  throw Error(tooLarge_->string(), "", fmt::format("is larger than {} MiB", maxBytes_ >> 20),
+              "export the model with fewer triangles, or smaller textures");
+}
+
+std::optional<Bytes> ModelFiles::readListed(const FileIndex& index, const std::string& path) {
+  for (const FileIndex::Entry* entry : index.findAlike(path)) {
+    if (entry->embedded != nullptr) return *entry->embedded;
+    if (auto bytes = readDisk(folder_ / entry->path)) return bytes;
+  }
+  return std::nullopt;
+}
+
+std::optional<Bytes> ModelFiles::readDisk(const fs::path& file) {
+  std::error_code status;
+  if (!fs::is_regular_file(file, status)) return std::nullopt;
+  if (fs::file_size(file, status) <= maxBytes_) return readFile(file, maxBytes_);
+  tooLarge_ = file;
+  return std::nullopt;
+}
+
+}  // namespace tessera
