@@ -54,6 +54,11 @@ TileBox TileTree::boxOfCells(int tile) const {
           Vec3d(wall(cells.i1, columns, INFINITY), wall(cells.j1, rows, INFINITY), INFINITY)};
 }
 
+void TileTree::removeBackgroundBlocks() {
+  while (!tiles.empty() && tiles.back().isBackgroundBlock) tiles.pop_back();  // they come last
+  backgroundBlock = -1;
+}
+
 void TileTree::check() const {
   CHECK(tiles.empty() == false);
   CHECK(backgroundBlock < static_cast<int>(tiles.size()));

@@ -47,6 +47,8 @@ struct TileTree {
   // The box in which a content is drawn for a tile's cells: as high as the tile, and unbounded at the border of the
   // scene.
   TileBox boxOfCells(int tile) const;
+  // For renderers that never draw them.
+  void removeBackgroundBlocks();
   // Aborts if the tree violates the rules above.
   void check() const;
 };

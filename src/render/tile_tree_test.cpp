@@ -83,5 +83,22 @@ TEST(TileTree, HasTheTopmostContentsForItsCoarsest) {
   EXPECT_EQ(tree.coarsest(), (std::vector<int>{0}));
 }
 
+TEST(TileTree, LosesNothingButItsBackgroundBlocks) {
+  const TileTree without = testTree(2, 2);
+  TileTree tree = without;
+  tree.backgroundBlock = static_cast<int>(tree.tiles.size());
+  tree.tiles.resize(tree.tiles.size() + 2);
+  for (TileNode* node : {&tree.tiles.end()[-2], &tree.tiles.end()[-1]}) node->isBackgroundBlock = true;
+  tree.tiles.end()[-2].children = {tree.backgroundBlock + 1};
+  tree.tiles.end()[-1].parent = tree.backgroundBlock;
+  tree.check();
+  for (int i = 0; i < 2; ++i) {
+    tree.removeBackgroundBlocks();
+    tree.check();
+    EXPECT_EQ(tree.backgroundBlock, -1);
+    EXPECT_EQ(tree.tiles.size(), without.tiles.size());
+  }
+}
+
 }  // namespace
 }  // namespace tessera

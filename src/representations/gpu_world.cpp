@@ -35,6 +35,7 @@ std::unique_ptr<WorldRenderer> openGpuWorld(const std::shared_ptr<const GpuConte
     const Tileset tileset = readTileset(folder);
     TileScene opened = openTileScene(folder, requireCodec(folder, tileset));
     if (scene.placement) opened.frame = placeFrame(opened.frame, *scene.placement);
+    if (!isMain) opened.tree.removeBackgroundBlocks();  // nothing outside their boxes is drawn
     scenes.push_back({std::make_unique<GpuSceneRenderer>(stream, makeGpuDrawer(tileset.representation, stream),
                                                          std::move(opened), share),
                       isMain});

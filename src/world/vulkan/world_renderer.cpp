@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "base/error.h"
 #include "shaders/add_scene.h"
@@ -64,6 +65,16 @@ WorldRenderer::WorldRenderer(std::shared_ptr<GpuStream> stream, std::vector<Scen
   }
 }
 
+WorldRenderer::~WorldRenderer() {
+  // After an exception, commands may be queued that use what is destroyed now, and another owner of the stream would
+  // submit them later.
+  try {
+    stream_->finish();
+  } catch (const std::exception&) {  // the device is lost
+  }
+  stream_->context()->waitIdle();
+}
+
 std::vector<size_t> WorldRenderer::farthestFirst(const Vec3d& eye) const {
   std::vector<size_t> order(scenes_.size());
   std::iota(order.begin(), order.end(), 0);
@@ -105,6 +116,10 @@ void WorldRenderer::ensureCapacity(const Camera& camera) {
 }
 
 void WorldRenderer::queue(const Camera& camera, const Pose& worldFromCamera, bool exact) {
+  // Forgotten until this image is complete: an exception leaves some scenes as they were.
+  const std::optional<View> last = std::exchange(last_, std::nullopt);
+  const bool isSame = last && camera == last->camera && worldFromCamera.rotation == last->worldFromCamera.rotation &&
+                      worldFromCamera.translation == last->worldFromCamera.translation && exact == last->exact;
   ensureCapacity(camera);
   const uint32_t pixels = static_cast<uint32_t>(width_) * static_cast<uint32_t>(height_);
   const Groups groups = {workgroups(pixels, kGroup, kMaxGroups)};
@@ -120,11 +135,6 @@ void WorldRenderer::queue(const Camera& camera, const Pose& worldFromCamera, boo
   }
   stream_->run(begin_, std::as_bytes(std::span(&begun, 1)), groups);
   const std::vector<size_t> order = farthestFirst(worldFromCamera.translation);
-  const bool isSame = camera == camera_ && worldFromCamera.rotation == worldFromCamera_.rotation &&
-                      worldFromCamera.translation == worldFromCamera_.translation && exact == wasExact_;
-  camera_ = camera;
-  worldFromCamera_ = worldFromCamera;
-  wasExact_ = exact;
   bool hasChanged = false;
   for (size_t place = 0; place < order.size(); ++place) {
     PlacedScene& scene = scenes_[order[place]];
@@ -144,6 +154,7 @@ void WorldRenderer::queue(const Camera& camera, const Pose& worldFromCamera, boo
     hasChanged |= changes != scene.changes || wasFading || scene.renderer->isFading();
     scene.changes = changes;
   }
+  last_ = {camera, worldFromCamera, exact};
 }
 
 RenderedView WorldRenderer::render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) {

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "render/vulkan/gpu_scene_renderer.h"
@@ -27,7 +28,7 @@ class WorldRenderer final : public GpuViewRenderer {
   // now are ignored.
   WorldRenderer(std::shared_ptr<GpuStream> stream, std::vector<Scene> scenes, std::unique_ptr<ModelPass> models,
                 const std::vector<HiddenBox>& hidden, const Eigen::Array3f& background);
-  ~WorldRenderer() override { stream_->context()->waitIdle(); }
+  ~WorldRenderer() override;
 
   // The depth is that of the nearest surface. Throws Error if there are models and the camera is no pinhole.
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth = nullptr) override;
@@ -59,9 +60,12 @@ class WorldRenderer final : public GpuViewRenderer {
   Eigen::Array3f background_;
   GpuBuffer image_;  // [pixels][3] colours, [pixels] opacities, [pixels] depths
   int width_ = 0, height_ = 0;
-  Camera camera_;  // of the last image
-  Pose worldFromCamera_;
-  bool wasExact_ = false;
+  struct View {
+    Camera camera;
+    Pose worldFromCamera;
+    bool exact = false;
+  };
+  std::optional<View> last_;  // the view of `image_`; nothing if that is not complete
 };
 
 }  // namespace tessera
