@@ -2,11 +2,10 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-
 #include "apps/tessera/scene_source.h"
 #include "base/error.h"
-#include "tiles/scene_folder.h"
+#include "base/log.h"
+#include "world/main_scene.h"
 #include "world/world_file.h"
 #ifdef TESSERA_HAS_VULKAN
 #include "compute/vulkan/device.h"
@@ -38,17 +37,24 @@ class WorldRenderSource final : public RenderSource {
   WorldRenderSource(const Device& device, const fs::path& worldFile, const RenderSourceOptions& options)
       : worldFile_(worldFile) {
     const World world = readWorldFile(worldFile);
-    const auto main = std::find_if(world.scenes.begin(), world.scenes.end(),
-                                   [](const WorldScene& scene) { return !scene.placement; });
-    const std::string place = fmt::format("scenes[{}]", main - world.scenes.begin());
-    sourceFromWorld_ = readTileset(resolveScene(worldFile, *main, place)).sourceFromWorld;
+    main_ = fmt::format("scenes[{}]", findMainScene(world));
+    sourceFromWorld_ = readSourceFromWorld(world, worldFile);
     renderer_ = makeWorldRenderer(device, worldFile, world, options);
   }
 
   ViewRenderer& renderer() override { return *renderer_; }
-  Mat4d sourceFromWorld() const override { return sourceFromWorld_; }
+  Mat4d sourceFromWorld() const override {
+    if (sourceFromWorld_) return *sourceFromWorld_;
+    throw Error(worldFile_.string(), main_, "is not there, and camera paths are in the coordinates of its photos",
+                "put that scene there, or render the views of a capture (--views)");
+  }
   void requireMatchingWorld(const Capture& capture) const override {
-    if ((capture.sourceFromWorld - sourceFromWorld_).norm() <= 1e-9 * sourceFromWorld_.norm()) return;
+    if (!sourceFromWorld_) {
+      warn("{}: {} is not there, so that it is unknown whether {} is of the same world", worldFile_.string(), main_,
+           capture.root.string());
+      return;
+    }
+    if ((capture.sourceFromWorld - *sourceFromWorld_).norm() <= 1e-9 * sourceFromWorld_->norm()) return;
     throw Error(capture.root.string(), "transforms.json",
                 "its world is not the one of the main scene of " + worldFile_.string(), "use that scene's capture");
   }
@@ -57,7 +63,8 @@ class WorldRenderSource final : public RenderSource {
 
  private:
   fs::path worldFile_;
-  Mat4d sourceFromWorld_;
+  std::string main_;                      // the place of the main scene in the file
+  std::optional<Mat4d> sourceFromWorld_;  // nothing if that scene is invisible and not there
   std::unique_ptr<ViewRenderer> renderer_;
 };
 

@@ -16,6 +16,7 @@
 #include "representations/gpu_drawers.h"
 #include "tiles/scene_folder.h"
 #include "train/model_folder.h"
+#include "world/main_scene.h"
 
 namespace tessera {
 namespace {
@@ -55,12 +56,19 @@ void requireViewable(const fs::path& folder) {
               remedy);
 }
 
-Place loadPlace(const ViewOptions& options) {
+std::optional<WorldToView> readWorldToView(const ViewOptions& options) {
+  const std::optional<fs::path> file = findWorldFile(options.folder);
+  if (!file) return std::nullopt;
+  return WorldToView{*file, readWorldFile(*file)};
+}
+
+Place loadPlace(const ViewOptions& options, const std::optional<WorldToView>& world) {
   Place place;
   fs::path views = options.views;
-  Mat4d sourceFromWorld = Mat4d::Identity();
-  if (const std::optional<fs::path> file = worldFileToView(options)) {
-    place = loadWorldPlace(readWorldFile(*file), *file, sourceFromWorld);
+  std::optional<Mat4d> sourceFromWorld;  // nothing if it is unknown
+  if (world) {
+    place = loadWorldPlace(*world);
+    sourceFromWorld = readSourceFromWorld(world->world, world->file);
   } else if (isScene(options.folder)) {
     const Tileset tileset = readTileset(options.folder);
     const TileFrame frame = makeTileFrame(tileset);
@@ -92,7 +100,10 @@ Place loadPlace(const ViewOptions& options) {
     warn("{}: there are no views of photos", error.what());
     return place;
   }
-  if ((capture.sourceFromWorld - sourceFromWorld).norm() > 1e-9 * sourceFromWorld.norm()) {
+  if (!sourceFromWorld) {
+    warn("{}: its main scene is not there, so that it is unknown whether {} is of the same world",
+         options.folder.string(), views.string());
+  } else if ((capture.sourceFromWorld - *sourceFromWorld).norm() > 1e-9 * sourceFromWorld->norm()) {
     const std::string other = "its world is not the one of " + options.folder.string();
     if (!options.views.empty()) {
       throw Error(views.string(), "transforms.json", other, "use the capture that it was trained on");
@@ -115,7 +126,8 @@ void waitForModel(const fs::path& folder) {
   }
 }
 
-std::unique_ptr<FrameSource> openPictures(const ViewOptions& options, const std::shared_ptr<const GpuContext>& window) {
+std::unique_ptr<FrameSource> openPictures(const ViewOptions& options, const std::optional<WorldToView>& world,
+                                          const std::shared_ptr<const GpuContext>& window) {
   // If the GPU drives no screen, the window may be shown by a Vulkan driver for the CPU. That driver renders the scene
   // only if it was named, or if there is no GPU.
   const std::string& kind = options.device.kind;
@@ -126,9 +138,7 @@ std::unique_ptr<FrameSource> openPictures(const ViewOptions& options, const std:
   settings.budgetBytes = static_cast<uint64_t>(options.memoryMiB * 1048576);
   settings.inBackground = true;
   settings.draw.exact = false;
-  if (const std::optional<fs::path> file = worldFileToView(options)) {
-    return openWorldPictures(options, *file, window, settings);
-  }
+  if (world) return openWorldPictures(options, *world, window, settings);
   if (isScene(options.folder) && isMeant) {
     return std::make_unique<GpuFrameSource>(openGpuScene(window, options.folder, settings));
   }

@@ -33,22 +33,15 @@ NamedView viewOfBookmark(const Bookmark& bookmark) {
 
 }  // namespace
 
-Place loadWorldPlace(const World& world, const fs::path& worldFile, Mat4d& sourceFromWorld) {
+Place loadWorldPlace(const WorldToView& opened) {
+  const auto& [worldFile, world] = opened;
   Place place;
   place.low = Vec3d::Constant(INFINITY);
   place.high = -place.low;
-  bool hasMain = false;
   for (size_t i = 0; i < world.scenes.size(); ++i) {
     const WorldScene& scene = world.scenes[i];
-    const bool isMain = !hasMain && !scene.placement;
-    if (!scene.isVisible && !isMain) continue;
-    const Tileset tileset = readTileset(resolveScene(worldFile, scene, fmt::format("scenes[{}]", i)));
-    if (isMain) {
-      sourceFromWorld = tileset.sourceFromWorld;
-      hasMain = true;
-    }
     if (!scene.isVisible) continue;
-    TileFrame frame = makeTileFrame(tileset);
+    TileFrame frame = makeTileFrame(readTileset(resolveScene(worldFile, scene, fmt::format("scenes[{}]", i))));
     if (scene.placement) frame = placeFrame(frame, *scene.placement);
     enclose(
         frame.low, frame.high,
@@ -61,7 +54,7 @@ Place loadWorldPlace(const World& world, const fs::path& worldFile, Mat4d& sourc
   return place;
 }
 
-std::unique_ptr<FrameSource> openWorldPictures(const ViewOptions& options, const fs::path& worldFile,
+std::unique_ptr<FrameSource> openWorldPictures(const ViewOptions& options, const WorldToView& opened,
                                                const std::shared_ptr<const GpuContext>& window,
                                                const GpuRendererSettings& settings) {
   if (options.device.kind != "auto" && !parseVulkanDevice(options.device.kind)) {
@@ -69,7 +62,7 @@ std::unique_ptr<FrameSource> openWorldPictures(const ViewOptions& options, const
         "--device " + options.device.kind, "", "worlds are drawn by Vulkan only",
         "use --device auto or vulkan; without a GPU, Mesa's driver for the CPU draws them (mesa-vulkan-drivers)");
   }
-  return std::make_unique<GpuFrameSource>(openGpuWorld(window, readWorldFile(worldFile), worldFile, settings));
+  return std::make_unique<GpuFrameSource>(openGpuWorld(window, opened.world, opened.file, settings));
 }
 
 }  // namespace tessera

@@ -82,14 +82,15 @@ std::string folderName(const fs::path& folder) {
 
 class Viewer {
  public:
-  Viewer(const ViewOptions& view, const WindowOptions& options)
+  // `world`: from readWorldToView; not needed afterwards.
+  Viewer(const ViewOptions& view, const std::optional<WorldToView>& world, const WindowOptions& options)
       : options_(options),
-        place_(loadPlace(view)),
+        place_(loadPlace(view, world)),
         navigation_(place_.low, place_.high),
         name_(folderName(view.folder)),
         window_("tessera: " + name_, options.width, options.height),
         screen_(openScreen(window_, view)),
-        pictures_(openPictures(view, screen_.context)),
+        pictures_(openPictures(view, world, screen_.context)),
         showPicture_(screen_.context, screen_.presenter->renderPass(), kWholeWindowSpirv, kShowPictureSpirv),
         interface_(window_, screen_.context, screen_.presenter->renderPass()) {
     navigation_.setMode(options.mode);
@@ -250,7 +251,8 @@ class Viewer {
 void runViewer(const ViewOptions& view, const WindowOptions& options) {
   requireViewable(view.folder);
   waitForModel(view.folder);
-  Viewer(view, options).run();
+  Viewer viewer(view, readWorldToView(view), options);
+  viewer.run();
 }
 
 }  // namespace tessera

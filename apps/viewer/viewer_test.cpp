@@ -56,7 +56,7 @@ class ViewerTest : public testing::Test {
     const std::unique_ptr<RenderSource> renderSource = openRenderSource(*cpu, folder, {2});
     ViewOptions view;
     view.folder = folder;
-    const Place place = loadPlace(view);
+    const Place place = loadPlace(view, std::nullopt);
     const double focal = 0.5 * kHeight / std::tan(25 * std::numbers::pi / 180);
     const Camera camera = {kWidth, kHeight, LensModel::pinhole, {focal, focal, 0.5 * kWidth, 0.5 * kHeight}};
     const Pose pose = Navigation(place.low, place.high).worldFromCamera();
@@ -115,12 +115,12 @@ TEST_F(ViewerTest, ShowsAWorldWithItsModelsFromABookmark) {
   window.screenshot = folder_ / "shown.png";
   runViewer(view, window);
   const ImageU8 seen = readImage(window.screenshot).image;
-  const Place place = loadPlace(view);
+  const std::optional<WorldToView> read = readWorldToView(view);
+  const Place place = loadPlace(view, read);
   ASSERT_EQ(place.views.size(), 1u);
   GpuRendererSettings settings;
   settings.selection.maximumScreenSpaceError = 0;
-  const auto world =
-      openGpuWorld(openForTest(), readWorldFile(folder_ / "world.json"), folder_ / "world.json", settings);
+  const auto world = openGpuWorld(openForTest(), read->world, read->file, settings);
   const double focal = 0.5 * kHeight / std::tan(25 * std::numbers::pi / 180);
   const Camera camera = {kWidth, kHeight, LensModel::pinhole, {focal, focal, 0.5 * kWidth, 0.5 * kHeight}};
   const ImageU8 expected =

@@ -8,6 +8,7 @@
 #include "representations/codecs.h"
 #include "representations/gpu_drawers.h"
 #include "tiles/scene_folder.h"
+#include "world/main_scene.h"
 #include "world/placed_models.h"
 
 namespace tessera {
@@ -25,11 +26,10 @@ std::unique_ptr<WorldRenderer> openGpuWorld(const std::shared_ptr<const GpuConte
   const auto stream = std::make_shared<GpuStream>(context);
   std::vector<WorldRenderer::Scene> scenes;
   Eigen::Array3f background = Eigen::Array3f::Zero();
-  bool hasMain = false;
+  const size_t main = findMainScene(world);
   for (size_t i = 0; i < world.scenes.size(); ++i) {
     const WorldScene& scene = world.scenes[i];
-    const bool isMain = !scene.placement && !hasMain;
-    hasMain |= isMain;
+    const bool isMain = i == main;
     if (!scene.isVisible) continue;
     const fs::path folder = resolveScene(worldFile, scene, fmt::format("scenes[{}]", i));
     const Tileset tileset = readTileset(folder);
