@@ -37,7 +37,7 @@ class Entry {
   bool has(const char* key) const { return json_fields::getField(object_, key) != nullptr; }
   std::string text(const char* key) const {  // empty if it is missing or no text
     const std::string* text = json_fields::getString(object_, key);
-    if (text != nullptr && text->size() > kNameLength) refuse(key, "is too long");
+    if (text != nullptr && countCharacters(*text) > kNameLength) refuse(key, "is too long");
     return text == nullptr ? "" : *text;
   }
   std::string name() const {
@@ -90,6 +90,7 @@ WorldScene readScene(const Entry& entry) {
   WorldScene scene;
   scene.name = entry.text("name");
   scene.url = entry.text("url");
+  if (hasOtherScheme(scene.url)) entry.refuse("url", "is neither an address of http or https nor a relative one");
   scene.isVisible = entry.isOn("visible");
   if (!entry.has("position") && !entry.has("rotation") && !entry.has("scale")) return scene;
   Placement& placement = scene.placement.emplace();
@@ -111,7 +112,8 @@ WorldModel readModelEntry(const Entry& entry) {
   for (const json& file : *files) {
     if (!file.is_string()) entry.refuse("files", "has an invalid name");
     const std::string& name = file.get_ref<const std::string&>();
-    if (name.empty() || name.size() > kNameLength) entry.refuse("files", "has an invalid name");
+    const bool isOther = hasOtherScheme(name) || name.starts_with("//") || name.starts_with("\\\\");
+    if (name.empty() || countCharacters(name) > kNameLength || isOther) entry.refuse("files", "has an invalid name");
     model.files.push_back(name);
   }
   if (const json* contents = entry.list("contents")) {
@@ -147,7 +149,7 @@ bool parsePlace(std::string_view text, Vec3d& place) {
   for (int axis = 0; axis < 3; ++axis) {
     const size_t end = text.find(',');
     if ((end == std::string_view::npos) != (axis == 2)) return false;
-    const auto number = parseNumber(text.substr(0, end));
+    const auto number = parseNumber(trimmed(text.substr(0, end)));
     if (!number || std::abs(*number) >= 1e9) return false;
     place[axis] = *number;
     if (axis < 2) text.remove_prefix(end + 1);
@@ -155,10 +157,12 @@ bool parsePlace(std::string_view text, Vec3d& place) {
   return true;
 }
 
-// Parses "eye=x,y,z&target=x,y,z&fov=degrees".
+// Parses "eye=x,y,z&target=x,y,z&fov=degrees", in which '+' stands for a space.
 bool parseView(const std::string& address, Bookmark& bookmark) {
   bool hasEye = false, hasTarget = false;
-  const std::string plain = decodePercent(address);
+  std::string spaced = address;
+  std::replace(spaced.begin(), spaced.end(), '+', ' ');
+  const std::string plain = decodePercent(spaced);
   std::string_view rest = plain;
   if (rest.starts_with('#')) rest.remove_prefix(1);
   while (!rest.empty()) {
@@ -167,7 +171,7 @@ bool parseView(const std::string& address, Bookmark& bookmark) {
     if (word.starts_with("eye=")) hasEye = parsePlace(word.substr(4), bookmark.eye);
     if (word.starts_with("target=")) hasTarget = parsePlace(word.substr(7), bookmark.target);
     if (!word.starts_with("fov=")) continue;
-    const double degrees = parseNumber(word.substr(4)).value_or(0);
+    const double degrees = parseNumber(trimmed(word.substr(4))).value_or(0);
     if (degrees >= 5 && degrees <= 120) bookmark.fieldOfView = degrees;
   }
   return hasEye && hasTarget && (bookmark.eye - bookmark.target).norm() >= 1e-6;
@@ -183,11 +187,11 @@ Bookmark readBookmark(const Entry& entry) {
 }
 
 template <class Read>
-auto readList(const json& world, const char* key, size_t maximum, const std::string& file, Read read) {
+auto readList(const json& world, const char* key, bool isNeeded, size_t maximum, const std::string& file, Read read) {
   std::vector<decltype(read(std::declval<const Entry&>()))> all;
   const json* field = json_fields::getField(world, key);
-  if (field == nullptr) return all;
-  if (!field->is_array()) throw Error(file, key, "is not a list", kCorrect);
+  if (field == nullptr && !isNeeded) return all;
+  if (field == nullptr || !field->is_array()) throw Error(file, key, "is not a list", kCorrect);
   if (field->size() > maximum) throw Error(file, key, fmt::format("are more than {}", maximum), "keep fewer");
   for (size_t i = 0; i < field->size(); ++i)
     all.push_back(read(Entry((*field)[i], file, fmt::format("{}[{}]", key, i))));
@@ -202,7 +206,7 @@ std::map<std::string, Bytes> readFiles(const json& world, const std::string& fil
   uint64_t bytes = 0;
   for (const auto& [name, text] : field->items()) {
     const std::string place = fmt::format("files[\"{}\"]", name.substr(0, 100));
-    if (name.empty() || name.size() > kNameLength || files.size() == kMaxFiles) {
+    if (name.empty() || countCharacters(name) > kNameLength || files.size() == kMaxFiles) {
       throw Error(file, place, "is one file too many, or has no name", kCorrect);
     }
     if (!text.is_string()) throw Error(file, place, "is not text", kCorrect);
@@ -224,7 +228,7 @@ std::vector<WorldScene> readFirstVersion(const json& world) {
   if (const json* field = json_fields::getField(world, "scene")) {
     if (const std::string* name = json_fields::getString(*field, "name")) scene.name = name->substr(0, kNameLength);
     const std::string* url = json_fields::getString(*field, "url");
-    if (url != nullptr && url->size() <= kNameLength) scene.url = *url;
+    if (url != nullptr && countCharacters(*url) <= kNameLength && !hasOtherScheme(*url)) scene.url = *url;
   }
   return {scene};
 }
@@ -251,14 +255,15 @@ World decodeWorld(std::string_view text, const std::string& file) {
     throw Error(file, "version", "is neither 1 nor 2", "correct it, or use a newer tessera");
   }
   World world;
-  world.scenes = version == 1 ? readFirstVersion(parsed) : readList(parsed, "scenes", kMaxScenes, file, readScene);
+  world.scenes =
+      version == 1 ? readFirstVersion(parsed) : readList(parsed, "scenes", true, kMaxScenes, file, readScene);
   if (std::all_of(world.scenes.begin(), world.scenes.end(), [](const WorldScene& x) { return x.placement; })) {
     throw Error(file, "scenes", "contains no scene without a placement, which would define the frame of the world",
                 "leave out position, rotation and scale of one");
   }
-  world.models = readList(parsed, "models", kMaxModels, file, readModelEntry);
-  world.hidden = readList(parsed, "hidden", kMaxHiddenBoxes, file, readHiddenBox);
-  world.bookmarks = readList(parsed, "bookmarks", kMaxBookmarks, file, readBookmark);
+  world.models = readList(parsed, "models", version == 1, kMaxModels, file, readModelEntry);
+  world.hidden = readList(parsed, "hidden", false, kMaxHiddenBoxes, file, readHiddenBox);
+  world.bookmarks = readList(parsed, "bookmarks", false, kMaxBookmarks, file, readBookmark);
   world.files = readFiles(parsed, file);
   return world;
 }

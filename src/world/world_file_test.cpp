@@ -60,9 +60,46 @@ TEST(WorldFile, IsReadCompletely) {
 
 TEST(WorldFile, OfTheFirstVersionHasOneScene) {
   const World world =
-      decodeWorld(R"({"kind": "tessera world", "version": 1, "scene": {"name": "town", "url": "town"}})", "world.json");
+      decodeWorld(R"({"kind": "tessera world", "version": 1, "scene": {"name": "town", "url": "town"}, "models": []})",
+                  "world.json");
   ASSERT_EQ(world.scenes.size(), 1u);
   EXPECT_EQ(world.scenes[0].url, "town");
+  EXPECT_EQ(refusalAt(R"({"kind": "tessera world", "version": 1, "scene": {"url": "town"}})"), "models: is not a list");
+}
+
+TEST(WorldFile, CountsCharactersAsTheBrowserDoes) {
+  const auto place = [](const std::string& character, size_t count) {
+    std::string name;
+    for (size_t i = 0; i < count; ++i) name += character;
+    return refusalAt(worldWith(R"("bookmarks": [{"view": "eye=1,2,3&target=4,5,6", "name": ")" + name + "\"}]"));
+  };
+  for (const auto& [character, most] : {std::pair("a", 1000u), std::pair("ä", 1000u), std::pair("🏙", 500u)}) {
+    EXPECT_EQ(place(character, most), "") << character;
+    EXPECT_EQ(place(character, most + 1), "bookmarks[0].name: is too long") << character;
+  }
+}
+
+TEST(WorldFile, HasBookmarksAsTheBrowserWritesAddresses) {
+  const auto read = [](const std::string& view) {
+    return decodeWorld(worldWith(R"("bookmarks": [{"name": "a", "view": ")" + view + "\"}]"), "world.json")
+        .bookmarks[0];
+  };
+  for (const char* view : {"eye=40,-60,30&target=0,0,0&fov=35", "#eye= 40, -60,+30&target=0,0,0&fov=35+",
+                           "target=0%2C0%2C0&eye=40%2C-60%2C30&fov=35"}) {
+    EXPECT_EQ(read(view).eye, Vec3d(40, -60, 30)) << view;
+    EXPECT_EQ(read(view).fieldOfView, 35) << view;
+  }
+  EXPECT_EQ(read("eye=999999999,0,0&target=0,0,0&fov=121").eye.x(), 999999999);
+  EXPECT_EQ(read("eye=1,0,0&target=0,0,0&fov=121").fieldOfView, 50);
+  EXPECT_THROW(read("eye=1e9,0,0&target=0,0,0"), Error);
+}
+
+TEST(WorldFile, ShowsWhatIsNotSaidToBeHidden) {
+  const World world = decodeWorld(
+      worldWith(R"("hidden": [{"name": "a", "middle": [0, 0, 0], "size": [1, 1, 1], "turn": -1000, "hides": "no"}])"),
+      "world.json");
+  EXPECT_TRUE(world.hidden[0].hides);
+  EXPECT_EQ(world.hidden[0].turn, -1000);
 }
 
 TEST(WorldFile, IsRefusedWithThePlaceOfWhatIsWrong) {
@@ -79,6 +116,18 @@ TEST(WorldFile, IsRefusedWithThePlaceOfWhatIsWrong) {
             "models[0].rotation: is not a rotation");
   EXPECT_EQ(refusalAt(worldWith(model + R"("rotation": [0, 0, 0, 1], "scale": [1, 0, 1]}])")),
             "models[0].scale: is not above 1e-06");
+  for (const char* name : {"file:a.glb", "data:,a", "//example.org/a.glb", R"(\\\\a\\b.glb)", ""}) {
+    EXPECT_EQ(refusalAt(worldWith(R"("models": [{"files": [")" + std::string(name) + R"("]}])")),
+              "models[0].files: has an invalid name")
+        << name;
+  }
+  EXPECT_EQ(refusalAt(worldWith(R"("models": [{"files": ["HTTPS://example.org/a.glb", "3d:a.mtl"]}])")),
+            "models[0].name: is missing");
+  EXPECT_EQ(refusalAt(R"({"kind": "tessera world", "version": 2, "scenes": [{"url": "ftp://a"}]})"),
+            "scenes[0].url: is neither an address of http or https nor a relative one");
+  EXPECT_EQ(refusalAt(R"({"kind": "tessera world", "version": 2})"), "scenes: is not a list");
+  EXPECT_EQ(refusalAt(worldWith(R"("hidden": [{"name": "a", "middle": [0, 0, 0], "size": [1, 1, 1], "turn": 1001}])")),
+            "hidden[0].turn: is beyond 1000");
   EXPECT_EQ(refusalAt(worldWith(R"("models": [{"files": []}])")), "models[0].files: names no files, or too many");
   EXPECT_EQ(refusalAt(worldWith(R"("models": [7])")), "models[0]: is not an object");
   EXPECT_EQ(refusalAt(worldWith(R"("hidden": [{"name": "a", "middle": [0, 1e8, 0]}])")),

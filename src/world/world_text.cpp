@@ -17,16 +17,41 @@ int decodeDigit(char c) {
   return c == '+' ? 62 : c == '/' ? 63 : -1;
 }
 
-}  // namespace
-
-bool isOfNetwork(std::string_view address) {
+// Returns the scheme of an address; empty if it has none. Drives of Windows are none.
+std::string_view schemeIn(std::string_view address) {
+  if (address.empty() || std::isalpha(static_cast<unsigned char>(address[0])) == 0) return {};
   size_t end = 0;
   while (end < address.size() && (std::isalnum(static_cast<unsigned char>(address[end])) != 0 || address[end] == '+' ||
                                   address[end] == '-' || address[end] == '.')) {
     ++end;
   }
-  const bool hasScheme = end > 1 && end < address.size() && address[end] == ':';
-  return hasScheme || address.starts_with("//") || address.starts_with("\\\\");
+  return end > 1 && end < address.size() && address[end] == ':' ? address.substr(0, end) : std::string_view();
+}
+
+}  // namespace
+
+bool isOfNetwork(std::string_view address) {
+  return !schemeIn(address).empty() || address.starts_with("//") || address.starts_with("\\\\");
+}
+
+bool hasOtherScheme(std::string_view address) {
+  std::string scheme(schemeIn(address));
+  for (char& c : scheme) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return !scheme.empty() && scheme != "http" && scheme != "https";
+}
+
+size_t countCharacters(std::string_view text) {
+  size_t count = 0;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    count += (byte & 0xc0) == 0x80 ? 0 : byte >= 0xf0 ? 2 : 1;  // the first byte of a character tells how many units
+  }
+  return count;
+}
+
+std::string_view trimmed(std::string_view text) {
+  const size_t first = text.find_first_not_of(" \t\n\r"), last = text.find_last_not_of(" \t\n\r");
+  return first == std::string_view::npos ? std::string_view() : text.substr(first, last + 1 - first);
 }
 
 std::string decodePercent(std::string_view text) {
