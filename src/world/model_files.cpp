@@ -8,6 +8,11 @@
 #include "world/world_text.h"
 
 namespace tessera {
+namespace {
+
+constexpr const char* kLibrary = ".mtl";
+
+}  // namespace
 
 std::string plainPath(const std::string& path) {
   std::string plain = path;
@@ -40,6 +45,17 @@ std::vector<const FileIndex::Entry*> FileIndex::findAlike(const std::string& nam
   return alike;
 }
 
+bool FileIndex::hasExtension(const std::string& path, const std::string& lowerExtension) {
+  return keys(path)[2].ends_with(lowerExtension);
+}
+
+std::vector<const FileIndex::Entry*> FileIndex::withExtension(const std::string& lowerExtension) const {
+  std::vector<const Entry*> all;
+  for (const Entry& entry : entries_)
+    if (hasExtension(entry.path, lowerExtension)) all.push_back(&entry);
+  return all;
+}
+
 const Bytes* FileIndex::findEmbedded(const std::string& name) const {
   const std::array<std::string, 3> all = keys(plainPath(name));
   for (size_t k = 0; k < 2; ++k)
@@ -65,15 +81,15 @@ ModelFiles::ModelFiles(const FileIndex& embedded, const WorldModel& model, const
 std::optional<Bytes> ModelFiles::read(const std::string& path) {
   const std::string names[] = {path, decodePercent(path)};
   for (const std::string& name : names) {
-    if (auto bytes = readListed(listed_, name)) return bytes;
-    if (auto bytes = readListed(embedded_, name)) return bytes;
+    if (auto bytes = readFirst(listed_.findAlike(name))) return bytes;
+    if (auto bytes = readFirst(embedded_.findAlike(name))) return bytes;
   }
   for (const std::string& name : names) {
     const std::optional<fs::path> inside = resolveInside(folder_, plainPath(name));
     if (!inside) continue;
     if (auto bytes = readDisk(*inside)) return bytes;
   }
-  return std::nullopt;
+  return FileIndex::hasExtension(path, kLibrary) ? readOnlyLibrary() : std::nullopt;
 }
 
 void ModelFiles::requireSmallFiles() const {
@@ -82,8 +98,17 @@ void ModelFiles::requireSmallFiles() const {
               "export the model with fewer triangles, or smaller textures");
 }
 
-std::optional<Bytes> ModelFiles::readListed(const FileIndex& index, const std::string& path) {
-  for (const FileIndex::Entry* entry : index.findAlike(path)) {
+std::optional<Bytes> ModelFiles::readOnlyLibrary() {
+  std::vector<const FileIndex::Entry*> all = listed_.withExtension(kLibrary);
+  for (const FileIndex::Entry* entry : embedded_.withExtension(kLibrary)) {
+    const auto isSame = [&](const FileIndex::Entry* listed) { return listed->embedded == entry->embedded; };
+    if (std::none_of(all.begin(), all.end(), isSame)) all.push_back(entry);
+  }
+  return all.size() == 1 ? readFirst(all) : std::nullopt;
+}
+
+std::optional<Bytes> ModelFiles::readFirst(const std::vector<const FileIndex::Entry*>& entries) {
+  for (const FileIndex::Entry* entry : entries) {
     if (entry->embedded != nullptr) return *entry->embedded;
     if (auto bytes = readDisk(folder_ / entry->path)) return bytes;
   }

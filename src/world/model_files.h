@@ -26,6 +26,10 @@ class FileIndex {
   void add(const std::string& name, const Bytes* embedded);
   // Returns the files of this path, with letters of the same case first, then those of the same name in any folder.
   std::vector<const Entry*> findAlike(const std::string& name) const;
+  // The extension, such as .mtl, may be in upper or lower case.
+  static bool hasExtension(const std::string& path, const std::string& lowerExtension);
+  // Returns the files with this extension.
+  std::vector<const Entry*> withExtension(const std::string& lowerExtension) const;
   // Returns the embedded file of this path; null if there is none.
   const Bytes* findEmbedded(const std::string& name) const;
 
@@ -49,13 +53,15 @@ class ModelFiles {
   // Returns the content of a file that the model names by a path, which is relative to the folder of the world: among
   // the files that the world lists for the model, or else among all embedded ones, that of this path, or else the first
   // of this name in any folder. A file that is none of these must lie in the folder of the world: models come from
-  // anywhere. The path is looked up as it is, and then with %20 and the like decoded.
+  // anywhere. The path is looked up as it is, and then with %20 and the like decoded. If there is a single material
+  // library (.mtl) among the listed and embedded files, it stands for any that is not there.
   std::optional<Bytes> read(const std::string& path);
   // Throws Error if read() was asked for a file that is too large.
   void requireSmallFiles() const;
 
  private:
-  std::optional<Bytes> readListed(const FileIndex& index, const std::string& path);
+  std::optional<Bytes> readFirst(const std::vector<const FileIndex::Entry*>& entries);
+  std::optional<Bytes> readOnlyLibrary();
   std::optional<Bytes> readDisk(const fs::path& file);
 
   const FileIndex& embedded_;

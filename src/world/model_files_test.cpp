@@ -53,6 +53,17 @@ TEST_F(ModelFilesTest, AreEmbeddedOrOnDisk) {
   EXPECT_EQ(contentAt("a/x.png", {"a/box.gltf", "a/x.png"}), "a/x.png");
 }
 
+TEST_F(ModelFilesTest, HaveOneMaterialLibraryWhateverItsName) {
+  writeDisk("a/Paint.MTL");
+  EXPECT_EQ(contentAt("a/box.mtl", {"a/box.obj", "a/Paint.MTL"}), "a/Paint.MTL");
+  EXPECT_EQ(contentAt("a/box.png", {"a/box.obj", "a/Paint.MTL"}), "none");
+  EXPECT_EQ(contentAt("a/box.mtl", {"a/box.obj"}), "none");
+  embed("other.mtl");
+  EXPECT_EQ(contentAt("a/box.mtl", {"a/box.obj", "other.mtl"}), "other.mtl");
+  EXPECT_EQ(contentAt("a/box.mtl", {"a/box.obj"}), "other.mtl");
+  EXPECT_EQ(contentAt("a/box.mtl", {"a/box.obj", "a/Paint.MTL"}), "none");
+}
+
 TEST_F(ModelFilesTest, ThatOnlyTheModelNamesLieInTheWorldsFolder) {
   writeDisk("a/x 1.png");
   writeDisk("../secret.png");
