@@ -51,10 +51,10 @@ ModelPass::ModelPass(std::shared_ptr<GpuStream> stream, std::span<const Model> m
 }
 
 ModelPass::~ModelPass() {
-  if (pass_) stream_->deferDestroy(std::move(pass_));
-  for (auto* image : {&colourImage_, &depthImage_})
-    if (*image) stream_->deferDestroy(std::move(*image));
-  stream_->finish();
+  try {
+    stream_->finish();
+  } catch (const std::exception&) {  // the device is lost
+  }
 }
 
 template <class T>
