@@ -5,7 +5,7 @@ import { goldenFile, goldenText } from '../src/testing/golden';
 import { randomNumbers } from '../src/testing/test-tree';
 import { kCodecs } from '../src/representations/codecs';
 import { decodeTileset } from '../src/tiles/decode-tileset';
-import { goldenScene, launch, missing, serve, type Server } from './machine';
+import { goldenMesh, goldenScene, launch, missing, serve, type Server } from './machine';
 
 type Change = (json: any, binary: Buffer) => void;
 
@@ -48,6 +48,19 @@ const kContentLies: [string, string, Change][] = [
     binary.writeFloatLE(NaN, (getBufferView(json, ours(json).network).byteOffset as number) + 40)],
 ];
 
+// The same of a content of `mesh`.
+const kMeshLies: [string, string, Change][] = [
+  ['an offset behind the end', 'buffer', (json) => (getBufferView(json, part(json).vertices).byteOffset = 2 ** 30)],
+  ['patches beyond all', 'patches', (json) => (part(json).patches = 4e9)],
+  ['more patches than it has', 'vertices', (json) => (part(json).patches += 2)],
+  ['patches of a size that is none', 'patch_edge', (json) => (part(json).patch_edge = 6)],
+  ['textures of another size', 'features', (json) => (part(json).features[2] = part(json).vertices)],
+  ['a range that is infinite', 'ranges', (json) => (part(json).ranges[3][1] = '1e999')],
+  ['a place that is none', 'origin', (json) => (part(json).origin[0] = '-1e999')],
+  ['a background block that is none', 'background', (json) => (ours(json).background_block = true)],
+  ['a network that cannot be', 'network', (json) => (part(json).network.layers[0] = [17, 1e6])],
+];
+
 const kTilesetLies: [string, string, (text: string) => string][] = [
   ['a tree as deep as it likes', 'too deep', (text) => {
     const json = JSON.parse(text) as any;
@@ -60,17 +73,20 @@ const kTilesetLies: [string, string, (text: string) => string][] = [
   ['an error that is infinite', 'geometricError', (text) => text.replace(/"geometricError":\s*[\d.]+/, '"geometricError": 1e999')],
 ];
 
-describe.skipIf(missing())('a malformed scene', () => {
+describe.skipIf(missing()).each([
+  { representation: 'volume', folder: goldenScene, lies: kContentLies },
+  { representation: 'mesh', folder: goldenMesh, lies: kMeshLies },
+] as const)('a malformed scene of $representation', ({ representation, folder, lies }) => {
   let server: Server;
   let browser: Browser;
   let page: Page;
   const thrown: string[] = [];
   let change: { file: RegExp; body: Buffer } | undefined;
-  const tileset = decodeTileset(goldenText('tileset.json'), 'tileset.json', kCodecs);
+  const tileset = decodeTileset(goldenText('tileset.json', representation), 'tileset.json', kCodecs);
   const uri = tileset.tiles[1].contents[0].uri;
 
   beforeAll(async () => {
-    [server, browser] = await Promise.all([serve(goldenScene), launch()]);
+    [server, browser] = await Promise.all([serve(folder), launch()]);
     page = await browser.newPage({ viewport: { width: 320, height: 180 } });
     page.on('pageerror', (error) => thrown.push(error.message));
     await page.route(/\/scene\//, (route) =>
@@ -92,22 +108,22 @@ describe.skipIf(missing())('a malformed scene', () => {
     return text ?? '';
   }
 
-  it.each(kContentLies)('is reported: %s', async (_, reason, lie) => {
-    const said = await visit(new RegExp(uri), changedContent(goldenFile(uri), lie));
+  it.each([...lies])('is reported: %s', async (_, reason, lie) => {
+    const said = await visit(new RegExp(uri), changedContent(goldenFile(uri, representation), lie));
     expect(said).toContain(uri);
     expect(said.toLowerCase()).toContain(reason.toLowerCase());
   });
 
   it.each(kTilesetLies)('is reported: %s', async (_, reason, lie) => {
-    const said = await visit(/tileset\.json/, Buffer.from(lie(goldenText('tileset.json'))));
+    const said = await visit(/tileset\.json/, Buffer.from(lie(goldenText('tileset.json', representation))));
     expect(said).toContain('tileset.json');
     expect(said).toContain(reason);
   });
 
   it('is drawn or reported, whichever bytes of a tile are changed', async () => {
     const random = randomNumbers(17);
-    for (let round = 0; round < 6; ++round) {
-      const body = Buffer.from(goldenFile(uri));
+    for (let round = 0; round < 4; ++round) {
+      const body = Buffer.from(goldenFile(uri, representation));
       for (let i = 0; i < 1 + 4 * round; ++i) body[Math.floor(random() * body.length)] = Math.floor(random() * 256);
       const said = await visit(new RegExp(uri), body);
       if (said !== '') expect(said).toContain(uri);
