@@ -44,6 +44,8 @@ struct SceneView {
   const ResidentContent* pinned = nullptr;
 };
 
+inline constexpr double kUsualHysteresis = 1.2;  // see SelectionSettings
+
 struct ViewRequest {
   const Camera& camera;
   const Pose& worldFromCamera;
@@ -79,6 +81,8 @@ class CpuDrawer {
   virtual uint64_t residentBytes(uint64_t decodedBytes) const { return decodedBytes; }
   // Returns the same for a shared resource, which is counted once for all contents that use it.
   virtual uint64_t residentBytesOfResource(uint64_t decodedBytes) const { return decodedBytes; }
+  // The factor of SelectionSettings: larger where contents take long to load.
+  virtual double hysteresis() const { return kUsualHysteresis; }
   // Turns a decoded content into one that draw() accepts. Called by several threads at a time. `threads`: of its own
   // work on the content; 0: as many as the machine has.
   virtual std::unique_ptr<Content> prepare(std::unique_ptr<Content> content, int /*threads*/) const { return content; }

@@ -14,6 +14,13 @@
 
 namespace tessera {
 
+// Returns the settings with what they leave to a drawer (CpuDrawer, GpuDrawer).
+template <class Drawer>
+SelectionSettings selectionFor(const Drawer& drawer, SelectionSettings settings) {
+  if (settings.hysteresis == 0) settings.hysteresis = drawer.hysteresis();
+  return settings;
+}
+
 // ResidentContent: see TileCache.
 template <class ResidentContent>
 class SceneTiles {

@@ -22,7 +22,7 @@ namespace tessera {
 
 struct SelectionSettings {
   double maximumScreenSpaceError = 1.5;  // pixels of geometric error; 0: the finest tiles everywhere
-  double hysteresis = 1.2;               // also the factor by which resident tiles are preferred
+  double hysteresis = 0;                 // also the factor by which resident tiles are preferred; 0: the drawer's
   int finestLevel = 0;                   // tiles of this level and finer are never replaced
 };
 

@@ -130,11 +130,12 @@ export class TesseraScene extends THREE.Object3D {
   ) {
     super();
     this.name = tileset.name;
-    this.selection = { ...kSelectionSettings, ...options.selection };
     this.stream = { ...kStreamSettings, ...options.stream };
     this.tree = tileTree(tileset, 'tileset.json');
     this.fades = new LevelFades(this.tree);
     this.drawing = getDrawing(tileset.representation);
+    const { hysteresis = kSelectionSettings.hysteresis } = this.drawing;
+    this.selection = { ...kSelectionSettings, hysteresis, ...options.selection };
     const { rotation: r, scale, translation: t } = tileset.worldFromScene;
     this.localFromScene.set(
       r[0] * scale, r[3] * scale, r[6] * scale, t[0],

@@ -24,8 +24,8 @@ TileSource<Content> preparedBy(const CpuDrawer& drawer, TileSource<Content> sour
 SceneRenderer::SceneRenderer(std::unique_ptr<CpuDrawer> drawer, const TileFrame& frame, TileTree tree,
                              TileSource<Content> source, const SceneRendererSettings& settings)
     : drawer_(std::move(drawer)),
-      tiles_(frame, std::move(tree), preparedBy(*drawer_, std::move(source), settings.threads), settings.selection,
-             settings.budgetBytes),
+      tiles_(frame, std::move(tree), preparedBy(*drawer_, std::move(source), settings.threads),
+             selectionFor(*drawer_, settings.selection), settings.budgetBytes),
       settings_(settings),
       pool_(settings.threads) {
   const std::vector<std::string_view> modes = drawer_->skippingModes();

@@ -27,6 +27,9 @@ class GpuDrawer {
   // last of these: the drawer looks up what it has built for a resource, and each GpuContent keeps a reference to it.
   virtual std::unique_ptr<GpuContent> upload(const Content& content) = 0;
 
+  // The factor of SelectionSettings: larger where contents take long to load.
+  virtual double hysteresis() const { return kUsualHysteresis; }
+
   // Queues the drawing of a whole image.
   virtual void draw(GpuFrame& frame, const SceneView<GpuContent>& view, const ViewRequest& request,
                     const DrawSettings& settings) = 0;

@@ -31,7 +31,8 @@ GpuSceneRenderer::GpuSceneRenderer(std::shared_ptr<GpuStream> stream, std::uniqu
       drawer_(std::move(drawer)),
       prefetch_(settings.inBackground ? std::make_unique<TilePrefetch<std::unique_ptr<Content>>>(prepared(scene.source))
                                       : nullptr),
-      tiles_(scene.frame, std::move(scene.tree), uploaded(scene.source), settings.selection, settings.budgetBytes),
+      tiles_(scene.frame, std::move(scene.tree), uploaded(scene.source), selectionFor(*drawer_, settings.selection),
+             settings.budgetBytes),
       settings_(settings),
       background_(scene.background[0], scene.background[1], scene.background[2]),
       frame_(stream_) {

@@ -111,6 +111,7 @@ export interface SceneDrawing<
 > {
   modes: readonly ShownMode[];
   featureLevels?: FeatureLevels;
+  hysteresis?: number; // the default of SelectionSettings.hysteresis, if it is another one
   // Throws SceneError if the GPU cannot draw such a scene.
   makeDrawer(renderer: THREE.WebGLRenderer, scene: DrawnScene): SceneDrawer<Header, Decoded, Drawn>;
 }

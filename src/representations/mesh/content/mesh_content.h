@@ -23,6 +23,9 @@ inline constexpr const char* kMeshName = "mesh";  // the name of the representat
 inline constexpr uint32_t kMeshFeatures = 8;
 inline constexpr uint32_t kMeshHarmonics = 9;  // of the direction, inputs of the decoder after the features
 
+// Of SelectionSettings: UE4-NeRF's plugin frees a finer level beyond 1.5 times the distance at which it loads it.
+inline constexpr double kMeshHysteresis = 1.5;
+
 // The values that a byte stands for: linear from `low` (0) to `high` (255).
 struct FeatureRange {
   float low = 0, high = 1;

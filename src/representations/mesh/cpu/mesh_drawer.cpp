@@ -74,6 +74,7 @@ class MeshDrawer final : public CpuDrawer {
   // A patch has at least 312 bytes when decoded, and two triangles. With the copies of their corners, Embree takes up
   // to twice as much for them (mesh_drawer_test.cpp).
   uint64_t residentBytes(uint64_t decodedBytes) const override { return 3 * decodedBytes + (1 << 20); }
+  double hysteresis() const override { return kMeshHysteresis; }
   // While a content is prepared, its encoder is also in memory in float32.
   uint64_t residentBytesOfResource(uint64_t decodedBytes) const override { return 3 * decodedBytes; }
   std::unique_ptr<Content> prepare(std::unique_ptr<Content> content, int threads) const override {

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "render/scene_tiles.h"
 #include "representations/mesh/cpu/mesh_tracer.h"
 #include "tiles/bc4.h"
 
@@ -149,6 +150,14 @@ TEST_F(DrawMesh, TakesNoMoreMemoryThanItStates) {
     EXPECT_LE(resident, stated) << patches << " patches, " << decoded << " bytes when decoded";
     EXPECT_GT(resident, decoded);
   }
+}
+
+TEST(MeshDrawer, KeepsFinerLevelsLongerUnlessTheCallerSaysHowLong) {
+  const std::unique_ptr<CpuDrawer> drawer = makeMeshDrawer();
+  SelectionSettings settings;
+  EXPECT_EQ(selectionFor(*drawer, settings).hysteresis, 1.5);
+  settings.hysteresis = 1.1;
+  EXPECT_EQ(selectionFor(*drawer, settings).hysteresis, 1.1);
 }
 
 }  // namespace

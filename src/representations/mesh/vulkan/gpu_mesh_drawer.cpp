@@ -122,6 +122,7 @@ class GpuMeshDrawer final : public GpuDrawer {
   }
 
   bool crossFades() const override { return true; }
+  double hysteresis() const override { return kMeshHysteresis; }
 
   bool wantsAnotherFrame() const override { return wantsAnotherFrame_; }
 

@@ -7,5 +7,6 @@ import { kMeshModes } from './mesh-modes';
 
 export const meshDrawing = {
   modes: kMeshModes,
+  hysteresis: 1.5, // as UE4-NeRF's plugin frees a finer level beyond 1.5 times its distance
   makeDrawer: (renderer, scene) => new MeshDrawer(renderer, scene),
 } satisfies SceneDrawing<MeshHeader, MeshContent, DrawnMesh>;
