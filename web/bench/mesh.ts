@@ -141,6 +141,41 @@ describe('the viewer', () => {
     console.log(`levels as selected: a frame ${median(seconds).toFixed(3)} s, ${median(triangles)} triangles`);
   });
 
+  it('decodes fewer pixels where a model hides the scene', async () => {
+    const views = capturedViews(capture, 5).map(({ view }) => enlarged(view, 2));
+    const page = await open(scene);
+    await page.evaluate(() => headlessPage.open('scene/tileset.json'));
+    // What is as magenta as the background and the model is not decoded.
+    await page.evaluate(() => (headlessPage.world.background = new headlessPage.THREE.Color(0xff00ff)));
+    const decoded = async (view: View) => {
+      await page.evaluate((one) => headlessPage.times(one, 1), { ...view, cx: view.cx - 0.02 });
+      const pixels = new Uint8Array(Buffer.from(await page.evaluate(() => headlessPage.pixels()), 'base64'));
+      let others = 0;
+      for (let i = 0; i < pixels.length; i += 3) others += pixels[i] === 255 && pixels[i + 1] === 0 && pixels[i + 2] === 255 ? 0 : 1;
+      return (3 * others) / pixels.length;
+    };
+    const [times, shares]: number[][] = [[], []];
+    for (const view of views) {
+      const alone = (await timeFrames(page, [view])).seconds[0];
+      const shareAlone = await decoded(view);
+      await page.evaluate(() => {
+        const { THREE: { BufferGeometry, DoubleSide, Mesh, MeshBasicMaterial, Vector3 }, camera, world } = headlessPage;
+        const depth = new Vector3(0, 0, -2).applyMatrix4(camera.projectionMatrix).z; // 2 m away
+        const corners = [[-1, -1], [-1 / 3, -1], [-1 / 3, 1], [-1, -1], [-1 / 3, 1], [-1, 1]];
+        const geometry = new BufferGeometry().setFromPoints(corners.map(([x, y]) => new Vector3(x, y, depth).unproject(camera)));
+        const model = new Mesh(geometry, new MeshBasicMaterial({ color: 0xff00ff, side: DoubleSide }));
+        model.name = 'model';
+        world.add(model);
+      });
+      times.push((await timeFrames(page, [view])).seconds[0] / alone);
+      shares.push((await decoded(view)) / shareAlone);
+      await page.evaluate(() => headlessPage.world.getObjectByName('model')!.removeFromParent());
+    }
+    await close(page);
+    console.log(`with a model that covers a third of ${views[0].width}x${views[0].height}: a frame takes ${median(times).toFixed(2)} times as long`);
+    verdict('pixels that are decoded, relative to those without the model', median(shares), '<=', 0.7);
+  });
+
   // Vertices cost the same at each size, so `mesh` gains with the number of pixels.
   it.skipIf(!volume).each([1, 2, 4])('is faster than volume of the same place, with images of %i times the size', async (times) => {
     const views = capturedViews(capture, 5).map(({ view }) => enlarged(view, times));
