@@ -97,7 +97,7 @@ describe('the viewer', () => {
       await page.evaluate((one) => headlessPage.settle(one), view);
       const picked: [THREE.Vector3, THREE.Vector3][] = [];
       for (const { place, pixel: [x, y] } of placesOfDepth(join(capture, depthFile), lens, view)) {
-        // The truth is that of a place within the pixel; picking returns what its middle shows.
+        // Both are of the middle of the pixel.
         const surface = await page.evaluate(
           ([a, b]) => headlessPage.surfaceAt(a, b), [(2 * (x + 0.5)) / view.width - 1, 1 - (2 * (y + 0.5)) / view.height]);
         if (!surface) continue;
