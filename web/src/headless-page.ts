@@ -1,6 +1,7 @@
 // A page without user interface for tests and measurements, which draw views of a scene through `window.headlessPage`.
 import * as THREE from 'three';
 import { kYUpFromZUp } from './axes';
+import { rendererName } from './draw/software-renderer';
 import { TesseraScene, type SceneOptions } from './scene';
 import { updateScenes } from './scenes';
 
@@ -81,8 +82,7 @@ const headlessPage = {
   errors: [] as string[],
 
   gpu(): string {
-    const info = gl.getExtension('WEBGL_debug_renderer_info');
-    return String(gl.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : gl.RENDERER));
+    return rendererName(gl);
   },
 
   async open(url: string, options: SceneOptions = {}): Promise<void> {

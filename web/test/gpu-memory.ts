@@ -19,7 +19,7 @@ export function countGpuMemory(): void {
   const gl = WebGL2RenderingContext.prototype;
   const perTexel = new Map<number, number>([
     [gl.R8, 1], [gl.RG8, 2], [gl.RGB8, 3], [gl.RGBA8, 4], [gl.SRGB8_ALPHA8, 4], [gl.R16F, 2], [gl.RGBA16F, 8], [gl.R32F, 4],
-    [gl.RGBA32F, 16], [gl.R11F_G11F_B10F, 4], [gl.RGB10_A2, 4], [gl.R32UI, 4], [gl.R32I, 4], [gl.RG32UI, 8], [gl.RGBA8UI, 4],
+    [gl.RGBA32F, 16], [gl.R11F_G11F_B10F, 4], [gl.RGB10_A2, 4], [gl.R32UI, 4], [gl.R32I, 4], [gl.RG32UI, 8], [gl.RGBA32UI, 16], [gl.RGBA8UI, 4],
     [gl.DEPTH_COMPONENT16, 2], [gl.DEPTH_COMPONENT24, 4], [gl.DEPTH_COMPONENT32F, 4], [gl.DEPTH24_STENCIL8, 4],
     [gl.DEPTH32F_STENCIL8, 8], [gl.RGBA, 4], [gl.RGB, 3], [gl.LUMINANCE, 1], [gl.RED, 1], [0x8dbb, 0.5], [0x8dbd, 1], // the last two: BC4 and BC5
   ]);

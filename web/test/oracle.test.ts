@@ -38,7 +38,26 @@ function takeSmallTextures(): void {
   };
 }
 
-// Emulates GPUs that sample no textures in BC4 and BC5.
+// Emulates GPUs, for which scenes are drawn otherwise than by drivers for the CPU.
+function claimGpu(): void {
+  const { getParameter } = WebGL2RenderingContext.prototype;
+  WebGL2RenderingContext.prototype.getParameter = function (name: number) {
+    const unmaskedRenderer = 0x9246;
+    return name === unmaskedRenderer ? 'a GPU' : (getParameter.call(this, name) as unknown);
+  };
+}
+
+// Emulates GPUs whose programs have few uniforms.
+function takeFewUniforms(): void {
+  const { getParameter } = WebGL2RenderingContext.prototype;
+  WebGL2RenderingContext.prototype.getParameter = function (name: number) {
+    const unmaskedRenderer = 0x9246;
+    if (name === unmaskedRenderer) return 'a GPU';
+    return name === this.MAX_FRAGMENT_UNIFORM_VECTORS ? 64 : (getParameter.call(this, name) as unknown);
+  };
+}
+
+// Emulates drivers that sample no textures in BC4 and BC5.
 function takeNoBlockTextures(): void {
   const { getExtension } = WebGL2RenderingContext.prototype;
   WebGL2RenderingContext.prototype.getExtension = function (this: WebGL2RenderingContext, name: 'OCULUS_multiview') {
@@ -46,7 +65,9 @@ function takeNoBlockTextures(): void {
   } as typeof getExtension;
 }
 
-const kEmulated: Record<string, (() => void) | undefined> = { small: takeSmallTextures, noBlockTextures: takeNoBlockTextures };
+const kEmulated: Record<string, (() => void) | undefined> = {
+  small: takeSmallTextures, claimed: claimGpu, fewUniforms: takeFewUniforms, noBlockTextures: takeNoBlockTextures,
+};
 
 // Golden scenes; the first two represent the same landscape.
 const kScenes = { volume: goldenScene, hash: goldenHash, mesh: goldenMesh };
@@ -75,7 +96,8 @@ describe.skipIf(missing())('the browser', () => {
   it.each<[Golden, string, number]>([
     ['volume', 'default', 0], ['volume', 'default', 1], ['volume', 'swiftshader', 0], ['volume', 'small', 0],
     ['hash', 'default', 0], ['hash', 'default', 1], ['hash', 'swiftshader', 0],
-    ['mesh', 'default', 0], ['mesh', 'default', 1], ['mesh', 'swiftshader', 0], ['mesh', 'noBlockTextures', 0],
+    ['mesh', 'default', 0], ['mesh', 'default', 1], ['mesh', 'swiftshader', 0], ['mesh', 'claimed', 0],
+    ['mesh', 'fewUniforms', 0], ['mesh', 'noBlockTextures', 0],
   ])('draws what the CPU draws of %s: GPU %s, level %i', async (representation, gpu, level) => {
     const name = `${representation}-${level}`;
     const path = join(folder, `path-${name}.json`);

@@ -11,16 +11,16 @@ import { kFarAway, type ContentPlace, type DrawnPart, type DrawnScene, type Draw
 import { screenTriangle } from '../../draw/screen-triangle';
 import type { Box } from '../../tiles/tileset';
 import { bytesOfPart, type MeshHeader } from './decode-mesh';
-import { patchesAcross, type MeshContent, type MeshPart } from './mesh-content';
+import { patchesAcross, textureSize, type MeshContent, type MeshPart } from './mesh-content';
 import { kMeshModes } from './mesh-modes';
 import { MeshTargets } from './mesh-targets';
 import { MeshTextures } from './mesh-textures';
-import { PartNumbers } from './part-numbers';
-import { decodeShader, kBlendShader, kCopyShader, kSkyShader, passMaterial } from './passes';
-import { makeChunks, selectRuns, visibleHalfSpaces, type PatchChunk } from './patch-chunks';
+import { kSortShader, kWholeScreen, PartColours, rectangleMaterial, type ColouredPart } from './part-colours';
+import { kBlendShader, kCopyShader, kSkyShader, passMaterial } from './passes';
+import { joinRuns, makeChunks, screenRectangle, selectChunks, visibleHalfSpaces, type PatchChunk, type ScreenRectangle } from './patch-chunks';
 import { bytesOfIndices, drawRange, patchGeometry } from './patch-geometry';
 import { distanceToBox, distanceToSides, jittered, frameJitter, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
-import { rasterMaterial, type RasterKind } from './raster-program';
+import { rasterMaterial, type RasterForm, type RasterKind } from './raster-program';
 
 const kWeightInMotion = 0.6; // of a frame; docs/benchmarks.md says why
 const kDepthSteps = 4; // between the depths of equal triangles
@@ -34,19 +34,17 @@ type TriangleMesh = THREE.Mesh<THREE.BufferGeometry, THREE.RawShaderMaterial>;
 
 interface DrawnMeshPart {
   part: MeshPart;
-  row: number; // in the texture of numbers
-  shape: number; // of its network
+  coloured: ColouredPart;
   geometry: THREE.BufferGeometry;
   chunks: PatchChunk[];
   uniforms: Uniforms;
-  meshes: Partial<Record<RasterKind, TriangleMesh[]>>; // one for each time that it is drawn in a picture
+  meshes: Map<string, TriangleMesh[]>; // of each form, one for each time that it is drawn in a picture
 }
 
 export interface DrawnMesh {
   id: number;
   box: Box;
   isBackground: boolean;
-  isCompressed: boolean;
   textures: MeshTextures;
   parts: DrawnMeshPart[];
 }
@@ -66,28 +64,26 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   readonly crossFades = true;
   pictures: Picture[] = [];
   private readonly targets: MeshTargets;
-  private readonly numbers = new PartNumbers();
   private readonly screen = screenTriangle();
   private readonly nothingOpaque = farthestDepth();
   private readonly anyCamera = new THREE.Camera();
   private readonly triangles = new THREE.Scene();
   private readonly pass = new THREE.Scene();
   private readonly uniforms: Uniforms; // of triangles and passes
-  private readonly passes: Record<'sky' | 'blend' | 'copy', TriangleMesh>;
-  private readonly decoders: TriangleMesh[] = []; // of each shape of networks
-  private readonly inspectors: TriangleMesh[] = []; // the same for display modes, compiled when they are shown
+  private readonly passes: Record<'sort' | 'sky' | 'blend' | 'copy', TriangleMesh>;
+  private readonly colours: PartColours;
   private readonly prepared = new Map<string, TriangleMesh>(); // keeps programs alive
   private lastId = 0;
   private last?: LastFrame;
   private framesAtRest = 0; // whose mean the history is; 0: the last frame showed another view
   private wantedFrames = 1;
   private framesInMotion = 0;
+  private isGeneral = false; // whether all contents need programs for whatever is seldom needed
 
   // Throws SceneError if the GPU cannot draw such a scene.
   constructor(private readonly renderer: THREE.WebGLRenderer, private readonly scene: DrawnScene) {
     this.targets = new MeshTargets(renderer);
     const { output, solid, dithered, decoded, history } = this.targets;
-    const [featuresFirst, featuresSecond, visible] = dithered.textures;
     this.uniforms = {
       ...this.view,
       part: { value: new THREE.Vector4() }, jitter: { value: new THREE.Vector2() }, origin: { value: new THREE.Matrix3() }, ray: { value: new THREE.Matrix3() },
@@ -96,16 +92,19 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       sceneLow: { value: new THREE.Vector3() }, sceneHigh: { value: new THREE.Vector3() },
       withinBox: { value: false }, frame: { value: 0 },
       boxFromReference: { value: Array.from({ length: 2 * kMaxHiddenBoxes }, () => new THREE.Matrix4()) },
-      visible: { value: visible }, solid: { value: solid.texture }, featuresFirst: { value: featuresFirst },
-      featuresSecond: { value: featuresSecond }, decoded: { value: decoded.texture }, history: { value: history.texture },
+      visible: { value: dithered.texture }, solid: { value: solid.texture },
+      decoded: { value: decoded.texture }, history: { value: history.texture },
       from: { value: output.target.textures[0] }, sky: { value: null },
-      partNumbers: this.numbers.texture, vectorsOfPart: this.numbers.vectorsOfPart,
       hasSurface: { value: false }, weight: { value: 1 }, hasHistory: { value: false }, isResting: { value: false },
       previousClip: { value: new THREE.Matrix4() }, previousPart: { value: new THREE.Vector4() },
     };
+    this.colours = new PartColours(renderer, this.uniforms);
+    const ofNoPart = { ...this.uniforms, partNumber: { value: 0 }, rectangle: { value: new THREE.Vector4(...kWholeScreen) } };
     this.passes = {
-      sky: this.makePass(kSkyShader), blend: this.makePass(kBlendShader), copy: this.makePass(kCopyShader),
+      sort: this.makePass(kSortShader), sky: this.colours.makeMesh(rectangleMaterial(kSkyShader, ofNoPart)),
+      blend: this.makePass(kBlendShader), copy: this.makePass(kCopyShader),
     };
+    Object.assign(this.passes.sort.material, { depthTest: true, depthWrite: true, depthFunc: THREE.AlwaysDepth });
     const { defines } = this.passes.blend.material;
     if (this.distancesOfBytes) defines.DISTANCES_OF_BYTES = '';
     else if (this.distance.type === THREE.HalfFloatType) defines.DISTANCES_OF_HALF_FLOATS = '';
@@ -130,21 +129,26 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   }
 
   get bytes(): number {
-    return this.targets.bytes + this.numbers.bytes + 4 * 9 + 1;
+    return this.targets.bytes + this.colours.bytes + 4 * 9 + 1;
   }
 
   residentBytes({ parts, isCompressed, skyEdge }: MeshHeader): number {
-    return parts.reduce((sum, part) => sum + bytesOfPart(part, isCompressed) + bytesOfIndices(part), 24 * skyEdge * skyEdge);
+    return parts.reduce((sum, part) => sum + bytesOfPart(part, isCompressed) + bytesOfIndices(part) + this.colours.bytesOfPart(part),
+      24 * skyEdge * skyEdge);
   }
 
-  prepare({ isCompressed }: MeshHeader): void {
+  prepare({ isCompressed, parts }: MeshHeader, { backgroundBlock }: ContentPlace): void {
     for (const kind of ['dithered', 'solid'] as const) {
-      const key = `${kind} ${isCompressed}`;
-      if (this.prepared.has(key)) continue;
-      const mesh = new THREE.Mesh(this.screen, rasterMaterial(kind, isCompressed));
-      this.prepared.set(key, mesh);
-      this.renderer.compile(mesh, this.anyCamera);
+      for (const isGeneral of [false, true]) {
+        const form = { kind, isBackground: backgroundBlock, isGeneral };
+        const key = JSON.stringify(form);
+        if (this.prepared.has(key)) continue;
+        const mesh = new THREE.Mesh(this.screen, rasterMaterial(form));
+        this.prepared.set(key, mesh);
+        this.renderer.compile(mesh, this.anyCamera);
+      }
     }
+    for (const part of parts) this.colours.prepare(part, isCompressed, this.anyCamera);
   }
 
   allocate(content: MeshContent, { box, backgroundBlock, number, level }: ContentPlace): DrawnMesh {
@@ -152,29 +156,24 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     const textures = new MeshTextures(content);
     const parts = content.parts.flatMap((part, n): DrawnMeshPart[] => {
       if (part.patches === 0) return [];
-      const { row, shape } = this.numbers.add(part, colourOfBlock(number), colourOfLevel(level));
-      const { features, opacity } = textures.parts[n];
+      const coloured = this.colours.add(part, isCompressed, textures.parts[n], colourOfBlock(number), colourOfLevel(level));
       const uniforms = {
         ...this.uniforms,
-        featureTexels: { value: features }, opacityTexels: { value: opacity },
-        patchLayout: { value: new THREE.Vector3(part.patchEdge, patchesAcross(part), row + 1) },
+        opacityTexels: { value: textures.parts[n].opacity },
+        partNumber: { value: coloured.number },
+        patchLayout: { value: new THREE.Vector2(part.patchEdge, patchesAcross(part)) },
+        texelSize: { value: new THREE.Vector2(...textureSize(part).map((texels) => 1 / texels)) },
         // The same each time that the content is loaded, so that images are, too.
-        layers: { value: 0x10001 * (number + 1) + 0x1000193 * n },
+        firstLayer: { value: 0x10001 * (number + 1) + 0x1000193 * n },
         partOrigin: { value: new THREE.Vector3() }, partStep: { value: part.step },
         share: { value: new THREE.Vector2() }, withinLow: { value: new THREE.Vector3() }, withinHigh: { value: new THREE.Vector3() },
-        isBackground: { value: backgroundBlock }, hiddenBoxes: { value: 0 },
+        hiddenBoxes: { value: 0 },
       };
       const { vertices } = content.texels[n];
       const geometry = patchGeometry(part, vertices);
-      return [{ part, row, shape, geometry, chunks: makeChunks(vertices), uniforms, meshes: {} }];
+      return [{ part, coloured, geometry, chunks: makeChunks(vertices), uniforms, meshes: new Map() }];
     });
-    this.numbers.shapes.slice(this.decoders.length).forEach((network) => {
-      const decoder = this.makePass(decodeShader(this.decoders.length, network, false));
-      this.inspectors.push(this.makePass(decodeShader(this.decoders.length, network, true)));
-      this.decoders.push(decoder);
-      this.renderer.compile(decoder, this.anyCamera);
-    });
-    return { id: ++this.lastId, box, isBackground: backgroundBlock, isCompressed, textures, parts };
+    return { id: ++this.lastId, box, isBackground: backgroundBlock, textures, parts };
   }
 
   upload(content: DrawnMesh): 'more' | 'wait' | 'done' {
@@ -183,15 +182,15 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       const { currentProgram } = this.renderer.properties.get(material) as { currentProgram?: { isReady(): boolean } };
       return currentProgram?.isReady() ?? true;
     };
-    return [...this.prepared.values(), ...this.decoders].every(isReady) ? 'done' : 'wait';
+    return [...this.prepared.values()].every(isReady) && this.colours.areReady ? 'done' : 'wait';
   }
 
   free({ textures, parts }: DrawnMesh): void {
     textures.dispose();
-    for (const { row, geometry, meshes } of parts) {
-      this.numbers.remove(row);
+    for (const { coloured, geometry, meshes } of parts) {
+      this.colours.remove(coloured);
       geometry.dispose();
-      for (const [{ material }] of Object.values(meshes)) material.dispose();
+      for (const [{ material }] of meshes.values()) material.dispose();
     }
   }
 
@@ -212,6 +211,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     const hidden = selectHiddenBoxes(settings.hidden, settings.hiddenOfBackgroundBlock);
     this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
     this.view.display.value = kMeshModes.findIndex(({ name }) => name === settings.display);
+    this.isGeneral = opaqueDepth !== null || settings.visibility < kFarAway || settings.withinBox;
     this.uniforms.visibility.value = settings.visibility;
     this.uniforms.withinBox.value = settings.withinBox;
     // The frames at rest are a sequence of their own, so that images depend on the view alone.
@@ -226,7 +226,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       // what is visible.
       if ((isResting || settings.hidesOthers) && !this.uniforms.hasSurface.value) this.drawSurfaces(pictures, contents, hidden);
       pictures.forEach((picture, i) => this.drawOne(picture, contents[i], settings, hidden, i, isResting));
-      this.run(this.passes.copy, this.targets.history, pictures);
+      this.run([this.passes.copy], this.targets.history, pictures);
     });
     const isDrawn = contents.some((ofOne) => ofOne.length > 0);
     this.last = {
@@ -252,10 +252,10 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
 
   dispose(): void {
     this.targets.dispose();
-    this.numbers.dispose();
+    this.colours.dispose();
     this.screen.dispose();
     this.nothingOpaque.dispose();
-    for (const { material } of [...Object.values(this.passes), ...this.decoders, ...this.inspectors, ...this.prepared.values()]) material.dispose();
+    for (const { material } of [...Object.values(this.passes), ...this.prepared.values()]) material.dispose();
   }
 
   private makePass(shader: string): TriangleMesh {
@@ -264,8 +264,8 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     return mesh;
   }
 
-  private run(pass: TriangleMesh, target: THREE.WebGLRenderTarget, pictures: Picture[]): void {
-    this.pass.children = [pass];
+  private run(passes: TriangleMesh[], target: THREE.WebGLRenderTarget, pictures: Picture[]): void {
+    this.pass.children = passes;
     for (const { camera, part } of pictures) {
       target.viewport.copy(part);
       this.uniforms.part.value = part;
@@ -290,20 +290,25 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     const point = this.place(picture, frontToBack, hidden);
     const isLayers = settings.display === 'layers';
     const isInspected = settings.display !== 'colour' && settings.display !== 'depth';
-    if (!isLayers) this.drawTriangles(picture, frontToBack, isInspected ? 'inspected' : 'dithered', dithered, point);
+    const rectangles = isLayers ? undefined : this.drawTriangles(picture, frontToBack, isInspected ? 'inspected' : 'dithered', dithered, point);
     decoded.viewport.copy(picture.part);
     this.renderer.setRenderTarget(decoded);
     if (number === 0) this.renderer.clear();
-    if (isLayers) {
+    if (!rectangles) {
       for (const isBackground of [true, false]) this.renderTriangles(picture, frontToBack, 'layers', isBackground, point);
     } else {
       const sky = frontToBack.map(({ content }) => content.textures.sky).find((one) => one !== undefined);
+      const passes = [...rectangles].map(([{ colours, inspector }, rectangle]) => {
+        const [x, y] = [2 / picture.part.z, 2 / picture.part.w]; // a pixel more, against rounding
+        colours.material.uniforms.rectangle.value.set(rectangle[0] - x, rectangle[1] - y, rectangle[2] + x, rectangle[3] + y);
+        return isInspected ? inspector : colours;
+      });
       if (sky && settings.endsRays && settings.display !== 'triangles' && settings.display !== 'alpha') {
         this.uniforms.sky.value = sky;
-        this.run(this.passes.sky, decoded, [picture]);
+        passes.push(this.passes.sky);
       }
-      const shapes = new Set(frontToBack.flatMap(({ content }) => content.parts.map(({ shape }) => shape)));
-      for (const shape of shapes) this.run((isInspected ? this.inspectors : this.decoders)[shape], decoded, [picture]);
+      this.run([this.passes.sort], decoded, [picture]);
+      this.run(passes, decoded, [picture]);
     }
     const before = this.last?.pictures[number];
     const hasHistory = before !== undefined && before.forward.dot(viewDirection(picture)) > kCosineOfCut;
@@ -312,7 +317,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       this.uniforms.previousClip.value = relativeTo(point, before.clipFromScene);
       this.uniforms.previousPart.value = before.part;
     }
-    this.run(this.passes.blend, output.target, [picture]);
+    this.run([this.passes.blend], output.target, [picture]);
   }
 
   // Sets the uniforms of a picture, and returns its reference point.
@@ -343,22 +348,23 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     return jittered(projection, this.uniforms.jitter.value, picture);
   }
 
-  // Draws the background block, and the other contents in front of it.
+  // Draws the tiles, and the background block behind them. Returns where each part may be visible.
   private drawTriangles(
     picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, target: THREE.WebGLRenderTarget, point: THREE.Vector3,
-  ): void {
+  ): Map<ColouredPart, ScreenRectangle> {
     target.viewport.copy(picture.part);
     if (picture === this.pictures[0]) this.targets.clear(this.renderer, target);
     this.renderer.setRenderTarget(target);
     this.renderer.clear(false, true, false);
-    this.renderTriangles(picture, frontToBack, kind, true, point);
+    const behind = this.renderTriangles(picture, frontToBack, kind, true, point);
     this.renderer.clear(false, true, false);
-    this.renderTriangles(picture, frontToBack, kind, false, point);
+    return new Map([...behind, ...this.renderTriangles(picture, frontToBack, kind, false, point)]);
   }
 
   private renderTriangles(
     picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, isBackground: boolean, point: THREE.Vector3,
-  ): void {
+  ): Map<ColouredPart, ScreenRectangle> {
+    const rectangles = new Map<ColouredPart, ScreenRectangle>();
     const meshes: TriangleMesh[] = [];
     this.uniforms.clipFromReference.value = this.project(picture, frontToBack, isBackground, point);
     const halfSpaces = visibleHalfSpaces(this.uniforms.clipFromReference.value, isParallel(picture.camera));
@@ -367,16 +373,25 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       if (content.isBackground !== isBackground) continue;
       // Of two contents that fade into each other, the one that most pixels show gives the solid surface.
       if ((kind === 'solid' || kind === 'layers') && !(share[0] <= 0.5 && share[1] > 0.5)) continue;
+      const isGeneral = kind === 'inspected' || kind === 'layers' || this.isGeneral || within !== kEverywhere || share !== kAllPixels ||
+        isParallel(picture.camera) || content.parts.some(({ uniforms }) => uniforms.hiddenBoxes.value > 0);
+      const form = { kind, isBackground, isGeneral };
+      const key = JSON.stringify(form);
       const low = new THREE.Vector3(...within.low).sub(point);
       const high = new THREE.Vector3(...within.high).sub(point);
       for (const [order, drawn] of content.parts.entries()) {
         drawn.uniforms.partOrigin.value.set(...drawn.part.origin).sub(point);
         const limits = { low: low.toArray(), high: high.toArray() };
-        for (const run of selectRuns(drawn.chunks, drawn.part, drawn.uniforms.partOrigin.value, halfSpaces, limits)) {
+        const chunks = selectChunks(drawn.chunks, drawn.part, drawn.uniforms.partOrigin.value, halfSpaces, limits);
+        if (chunks.length === 0) continue;
+        const rectangle = screenRectangle(chunks, drawn.part, drawn.uniforms.partOrigin.value, this.uniforms.clipFromReference.value);
+        rectangles.set(drawn.coloured, joinRectangles(rectangle, rectangles.get(drawn.coloured) ?? rectangle));
+        for (const run of joinRuns(chunks)) {
           const time = times.get(drawn) ?? 0;
           times.set(drawn, time + 1);
-          const ofKind = (drawn.meshes[kind] ??= []);
-          const mesh = (ofKind[time] ??= this.makeTriangles(kind, drawn, content.isCompressed, order, ofKind[0]));
+          const ofForm = drawn.meshes.get(key) ?? [];
+          drawn.meshes.set(key, ofForm);
+          const mesh = (ofForm[time] ??= this.makeTriangles(form, drawn, order, ofForm.find((one) => one !== undefined)));
           mesh.onBeforeRender = () => {
             drawRange(drawn.geometry, run);
             drawn.uniforms.withinLow.value.copy(low);
@@ -389,17 +404,16 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
         }
       }
     }
-    if (meshes.length === 0) return;
+    if (meshes.length === 0) return rectangles;
     this.triangles.children = meshes;
     this.renderer.render(this.triangles, picture.camera);
     this.triangles.children = [];
+    return rectangles;
   }
 
   // `other`: triangles of the same part and kind, whose material they share.
-  private makeTriangles(
-    kind: RasterKind, { geometry, uniforms }: DrawnMeshPart, isCompressed: boolean, order: number, other?: TriangleMesh,
-  ): TriangleMesh {
-    const material = other?.material ?? rasterMaterial(kind, isCompressed);
+  private makeTriangles(form: RasterForm, { geometry, uniforms }: DrawnMeshPart, order: number, other?: TriangleMesh): TriangleMesh {
+    const material = other?.material ?? rasterMaterial(form);
     material.uniforms = uniforms;
     // Of equal triangles, that of the first part is in front, as depths differ by rounding.
     material.polygonOffset = order > 0;
@@ -413,4 +427,8 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
 
 function viewDirection({ ray }: Picture): THREE.Vector3 {
   return new THREE.Vector3(0, 0, 1).applyMatrix3(ray).normalize();
+}
+
+function joinRectangles(a: ScreenRectangle, b: ScreenRectangle): ScreenRectangle {
+  return [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[2], b[2]), Math.max(a[3], b[3])];
 }

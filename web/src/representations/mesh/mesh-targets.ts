@@ -2,27 +2,24 @@
 import * as THREE from 'three';
 import { cannotRender, contentTarget, isComplete, type ContentTarget } from '../../draw/content-target';
 
-// How the targets are named: `visible` holds numbers of parts with bits of distances, after two images of features.
 export class MeshTargets {
   readonly output: ContentTarget; // colours and distances, for the page
-  readonly solid: THREE.WebGLRenderTarget;
-  readonly dithered: THREE.WebGLRenderTarget;
-  readonly decoded: THREE.WebGLRenderTarget;
+  readonly solid: THREE.WebGLRenderTarget; // numbers of parts with bits of distances
+  readonly dithered: THREE.WebGLRenderTarget; // what is visible: raster-program.ts
+  readonly decoded: THREE.WebGLRenderTarget; // colours
   readonly history: THREE.WebGLRenderTarget;
 
   // Throws SceneError if the GPU cannot render into such images.
   constructor(renderer: THREE.WebGLRenderer) {
     this.output = contentTarget(renderer, { representation: 'mesh', pictures: 2, morePictures: 0, holdsSums: false });
-    const { depthTexture } = this.output.target; // the passes that write `output` need none
+    // One depth serves all: the passes that write `output` need none, and those that write `decoded` use it otherwise.
+    const { depthTexture } = this.output.target;
     const nearest = { minFilter: THREE.NearestFilter, magFilter: THREE.NearestFilter, generateMipmaps: false } as const;
     this.solid = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthTexture });
-    this.dithered = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthTexture, count: 3 });
-    for (const texture of [this.solid.texture, this.dithered.textures[2]]) {
-      texture.format = THREE.RGIntegerFormat;
-      texture.type = THREE.UnsignedIntType;
-      texture.internalFormat = 'RG32UI';
-    }
-    this.decoded = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthBuffer: false });
+    this.dithered = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthTexture });
+    Object.assign(this.solid.texture, { format: THREE.RGIntegerFormat, type: THREE.UnsignedIntType, internalFormat: 'RG32UI' });
+    Object.assign(this.dithered.texture, { format: THREE.RGBAIntegerFormat, type: THREE.UnsignedIntType, internalFormat: 'RGBA32UI' });
+    this.decoded = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthTexture });
     this.history = new THREE.WebGLRenderTarget(1, 1, { ...nearest, depthBuffer: false, type: this.output.target.texture.type });
     if (this.all.every((target) => isComplete(renderer, target))) return;
     this.dispose();
@@ -54,10 +51,7 @@ export class MeshTargets {
     const gl = renderer.getContext() as WebGL2RenderingContext;
     renderer.setRenderTarget(target);
     renderer.state.buffers.color.setMask(true);
-    target.textures.forEach(({ format }, n) => {
-      if (format === THREE.RGIntegerFormat) gl.clearBufferuiv(gl.COLOR, n, [0, 0, 0, 0]);
-      else gl.clearBufferfv(gl.COLOR, n, [0, 0, 0, 0]);
-    });
+    gl.clearBufferuiv(gl.COLOR, 0, [0, 0, 0, 0]);
   }
 
   // Returns the distance of the solid surface in a pixel, if there is one.

@@ -1,14 +1,10 @@
-// The passes over a picture after its triangles are drawn: the colours of what is visible, one evaluation of a network
-// per pixel, and their blending with the frames before.
+// The passes over a picture after its triangles are drawn, apart from those of part-colours.ts: the sky, and the blending
+// with the frames before.
 import * as THREE from 'three';
-import { kHarmonics, layersShader } from '../../draw/network-shader';
 import { kScreenVertexShader } from '../../draw/screen-triangle';
-import type { DenseLayer } from '../../tiles/network';
-import { kFeatures } from './mesh-content';
-import { kPartNumbersSource, kVectorsBeforeNetwork } from './part-numbers';
-import { kHalfTransparent, kModeConstants } from './raster-program';
+import { kHalfTransparent } from './raster-program';
 
-const kHead = `
+export const kPassHead = `
 precision highp float;
 precision highp int;
 precision highp sampler2D;
@@ -28,14 +24,12 @@ export function passMaterial(fragmentShader: string, uniforms: Record<string, TH
   });
 }
 
-// Colours the pixels that show the sky, and leaves the others.
-export const kSkyShader = `${kHead}
+// Colours the pixels that show the sky: those that show no part.
+export const kSkyShader = `${kPassHead}
 out vec4 colour;
-uniform usampler2D visible;
 uniform sampler2D opaqueDepth, sky;
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  if (texelFetch(visible, at, 0).x != 0u) discard;
   if (texelFetch(opaqueDepth, min(at, textureSize(opaqueDepth, 0) - 1), 0).r < 1.0) discard;
   vec3 d = ray * vec3(pixelNdc(), 1.0), size = abs(d);
   int a = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
@@ -47,61 +41,10 @@ void main() {
   colour = vec4(textureLod(sky, texel / vec2(textureSize(sky, 0)), 0.0).rgb, 1.0);
 }`;
 
-// Colours the pixels of parts whose networks have a shape. `isInspected`: as a display mode shows them. That is a program
-// of its own, because drivers for the CPU evaluate all branches.
-export function decodeShader(shape: number, network: DenseLayer[], isInspected: boolean): string {
-  const features = [...Array(kFeatures).keys()].map((f) => `f${f >> 2}.${'xyzw'[f & 3]}`);
-  const harmonics = kHarmonics.slice(0, network[0].inputs - kFeatures);
-  const evaluate = (name: string, ofDirection: string[]) => {
-    const { lines, outputs } = layersShader([...features, ...ofDirection], network, (n) => `partVector(number, ${kVectorsBeforeNetwork + n})`);
-    return [
-      `vec3 ${name}(int number, vec4 f0, vec4 f1, vec3 d) {`, ...lines, `  return 1.0 / (1.0 + exp(-vec3(${outputs.join(', ')})));`, '}',
-    ].join('\n');
-  };
-  return `${kHead}
-${isInspected ? '#define INSPECTED' : ''}
-${kModeConstants}
-${kPartNumbersSource}
-out vec4 colour;
-uniform usampler2D visible;
-uniform sampler2D featuresFirst, featuresSecond;
-uniform int display;
-${evaluate('decode', harmonics.map((one) => `(${one})`))}
-#ifdef INSPECTED
-${evaluate('withoutDirection', harmonics.map((_, i) => (i === 0 ? kHarmonics[0] : '0.0')))}
-#endif
-void main() {
-  ivec2 at = ivec2(gl_FragCoord.xy);
-  int number = int(texelFetch(visible, at, 0).x & ${kHalfTransparent - 1}u) - 1;
-  if (number < 0) discard;
-  vec4 ofBlock = partVector(number, 4);
-  if (int(ofBlock.a) != ${shape}) discard;
-  vec4 first = texelFetch(featuresFirst, at, 0), second = texelFetch(featuresSecond, at, 0);
-  vec4 f0 = partVector(number, 0) + partVector(number, 2) * first, f1 = partVector(number, 1) + partVector(number, 3) * second;
-  vec3 d = normalize(ray * vec3(pixelNdc(), 1.0));
-#ifdef INSPECTED
-  vec3 seen;
-  if (display == kShowFeatures || display == kShowTriangles || display == kShowAlpha) {
-    seen = first.rgb;
-  } else if (display == kShowDiffuse) {
-    seen = withoutDirection(number, f0, f1, d);
-  } else {
-    seen = decode(number, f0, f1, d);
-    if (display == kShowSpecular) seen = clamp(0.5 + seen - withoutDirection(number, f0, f1, d), 0.0, 1.0);
-    vec3 tint = display == kShowBlocks ? ofBlock.rgb : partVector(number, 5).rgb;
-    if (display == kShowBlocks || display == kShowLevels) seen = tint * (0.35 + 0.65 * dot(seen, vec3(0.3, 0.6, 0.1)));
-  }
-#else
-  vec3 seen = decode(number, f0, f1, d);
-#endif
-  colour = vec4(seen, 1.0);
-}`;
-}
-
 // Blends the frame with those before, and states the distance of the solid surface. The rules are those of
 // shaders/representations/mesh/blend_frames.comp. Whether a pixel of a moving picture is noisy is seen from the pixels
 // around it, as there is no list of its layers.
-export const kBlendShader = `${kHead}
+export const kBlendShader = `${kPassHead}
 layout(location = 0) out vec4 colourAndOpacity;
 layout(location = 1) out vec4 distanceAndOpacity;
 uniform sampler2D decoded, history;
@@ -176,7 +119,7 @@ void main() {
   distanceAndOpacity = surface.x == 0u ? vec4(0.0) : vec4(distance, 0.0, 0.0, 1.0);
 }`;
 
-export const kCopyShader = `${kHead}
+export const kCopyShader = `${kPassHead}
 out vec4 copied;
 uniform sampler2D from;
 void main() {

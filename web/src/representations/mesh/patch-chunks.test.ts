@@ -2,7 +2,7 @@ import * as THREE from 'three';
 import { describe, expect, it } from 'vitest';
 import { randomNumbers } from '../../testing/test-tree';
 import type { Box } from '../../tiles/tileset';
-import { makeChunks, selectRuns, visibleHalfSpaces } from './patch-chunks';
+import { joinRuns, makeChunks, screenRectangle, selectChunks, visibleHalfSpaces } from './patch-chunks';
 
 const kEverywhere: Box = { low: [-1e9, -1e9, -1e9], high: [1e9, 1e9, 1e9] };
 const part = { step: 0.01 };
@@ -42,20 +42,22 @@ describe('chunks of patches', () => {
   it('are selected if a picture may show them, and join to runs', () => {
     const chunks = makeChunks(patchesInARow(1024));
     const ahead = camera(new THREE.Vector3(60, 0.5, 0.5), new THREE.Vector3(100, 0.5, 0.5));
-    expect(selectRuns(chunks, part, new THREE.Vector3(), visibleHalfSpaces(ahead, false), kEverywhere)).toEqual([{ first: 512, patches: 512 }]);
+    const selected = selectChunks(chunks, part, new THREE.Vector3(), visibleHalfSpaces(ahead, false), kEverywhere);
+    expect(joinRuns(selected)).toEqual([{ first: 512, patches: 512 }]);
+    expect(joinRuns([chunks[0], chunks[2], chunks[3]])).toEqual([{ first: 0, patches: 256 }, { first: 512, patches: 512 }]);
     const moved = new THREE.Vector3(-60, 0, 0);
-    expect(selectRuns(chunks, part, moved, visibleHalfSpaces(ahead, false), kEverywhere)).toEqual([]);
+    expect(selectChunks(chunks, part, moved, visibleHalfSpaces(ahead, false), kEverywhere)).toEqual([]);
     const away = camera(new THREE.Vector3(0, 50, 0.5), new THREE.Vector3(0, 100, 0.5));
-    expect(selectRuns(chunks, part, new THREE.Vector3(), visibleHalfSpaces(away, false), kEverywhere)).toEqual([]);
+    expect(selectChunks(chunks, part, new THREE.Vector3(), visibleHalfSpaces(away, false), kEverywhere)).toEqual([]);
   });
 
   it('are not selected outside of the box', () => {
     const chunks = makeChunks(patchesInARow(1024));
     const within: Box = { low: [30, -1e9, -1e9], high: [40, 1e9, 1e9] };
-    expect(selectRuns(chunks, part, new THREE.Vector3(), [], within)).toEqual([{ first: 256, patches: 256 }]);
+    expect(joinRuns(selectChunks(chunks, part, new THREE.Vector3(), [], within))).toEqual([{ first: 256, patches: 256 }]);
   });
 
-  it('are never left out if a vertex of theirs is visible', () => {
+  it('are never left out, nor out of their rectangle, if a vertex of theirs is visible', () => {
     const random = randomNumbers(7);
     const vertices = new Uint16Array(12 * 2048);
     for (let patch = 0; patch < 2048; ++patch) {
@@ -63,19 +65,25 @@ describe('chunks of patches', () => {
       for (let i = 0; i < 12; ++i) vertices[12 * patch + i] = middle[i % 3] + random() * 100;
     }
     const chunks = makeChunks(vertices);
-    let left = 0;
+    let [leftOut, smaller] = [0, 0];
     for (let round = 0; round < 50; ++round) {
       const place = () => new THREE.Vector3(100 * random(), 100 * random(), 100 * random());
       const clip = camera(place(), place());
-      const runs = selectRuns(chunks, part, new THREE.Vector3(), visibleHalfSpaces(clip, false), kEverywhere);
+      const selected = selectChunks(chunks, part, new THREE.Vector3(), visibleHalfSpaces(clip, false), kEverywhere);
+      const runs = joinRuns(selected);
       const isSelected = (patch: number) => runs.some(({ first, patches }) => patch >= first && patch < first + patches);
-      left += chunks.filter(({ first }) => !isSelected(first)).length;
+      const [left, bottom, right, top] = screenRectangle(selected, part, new THREE.Vector3(), clip);
+      if (right - left < 2 || top - bottom < 2) ++smaller;
+      leftOut += chunks.filter(({ first }) => !isSelected(first)).length;
       for (let corner = 0; corner < 4 * 2048; corner += 5) {
         const [x, y, z] = vertices.subarray(3 * corner, 3 * corner + 3);
         const at = new THREE.Vector4(part.step * x, part.step * y, part.step * z, 1).applyMatrix4(clip);
-        if (at.w > 0 && Math.abs(at.x) <= at.w && Math.abs(at.y) <= at.w) expect(isSelected(corner >> 2)).toBe(true);
+        if (!(at.w > 0 && Math.abs(at.x) <= at.w && Math.abs(at.y) <= at.w)) continue;
+        expect(isSelected(corner >> 2)).toBe(true);
+        expect(at.x / at.w >= left && at.x / at.w <= right && at.y / at.w >= bottom && at.y / at.w <= top).toBe(true);
       }
     }
-    expect(left).toBeGreaterThan(100);
+    expect(leftOut).toBeGreaterThan(100);
+    expect(smaller).toBeGreaterThan(10);
   });
 });

@@ -5,6 +5,7 @@ import type { Box, Vec3 } from '../../tiles/tileset';
 import { kCornerNumbers, type MeshPart } from './mesh-content';
 
 const kPatchesOfChunk = 256;
+const kSmallestDepth = 1e-6; // scene units
 
 export interface PatchChunk {
   first: number; // patch
@@ -45,22 +46,57 @@ export function visibleHalfSpaces({ elements: e }: THREE.Matrix4, isParallel: bo
   return isParallel ? sides : [w, ...sides];
 }
 
-// Returns the runs of chunks that may be visible. `origin`: that of the part, relative to the same point as
-// `halfSpaces` and `within`, the box outside of which nothing is drawn.
-export function selectRuns(
+// A rectangle of a picture: two opposite corners, from -1 to 1.
+export type ScreenRectangle = readonly [number, number, number, number];
+
+// Returns the chunks that may be visible. `origin`: that of the part, relative to the same point as `halfSpaces` and
+// `within`, the box outside of which nothing is drawn.
+export function selectChunks(
   chunks: readonly PatchChunk[], { step }: Pick<MeshPart, 'step'>, origin: THREE.Vector3, halfSpaces: readonly THREE.Vector4[], within: Box,
-): PatchRun[] {
-  const runs: PatchRun[] = [];
+): PatchChunk[] {
   const start = origin.toArray();
-  for (const { first, patches, low, high } of chunks) {
+  return chunks.filter(({ low, high }) => {
     const at = (numbers: Vec3, axis: number) => start[axis] + step * numbers[axis];
     const isOutside = [0, 1, 2].some((axis) => at(high, axis) < within.low[axis] || at(low, axis) > within.high[axis]) ||
       halfSpaces.some(({ x, y, z, w }) =>
         x * at(x > 0 ? high : low, 0) + y * at(y > 0 ? high : low, 1) + z * at(z > 0 ? high : low, 2) + w < 0);
-    if (isOutside) continue;
+    return !isOutside;
+  });
+}
+
+// Returns the runs of successive chunks.
+export function joinRuns(chunks: readonly PatchChunk[]): PatchRun[] {
+  const runs: PatchRun[] = [];
+  for (const { first, patches } of chunks) {
     const last = runs.at(-1);
     if (last && last.first + last.patches === first) last.patches += patches;
     else runs.push({ first, patches });
   }
   return runs;
+}
+
+// Returns a rectangle that contains what chunks show in a picture. `clip`: of places relative to the same point as
+// `origin`.
+export function screenRectangle(
+  chunks: readonly PatchChunk[], { step }: Pick<MeshPart, 'step'>, origin: THREE.Vector3, clip: THREE.Matrix4,
+): ScreenRectangle {
+  const { elements: e } = clip;
+  const [x, y, z] = origin.toArray();
+  const bounds: [number, number, number, number] = [1, 1, -1, -1];
+  for (const { low, high } of chunks) {
+    for (let corner = 0; corner < 8; ++corner) {
+      const px = x + step * (corner & 1 ? high : low)[0];
+      const py = y + step * (corner & 2 ? high : low)[1];
+      const pz = z + step * (corner & 4 ? high : low)[2];
+      const w = e[3] * px + e[7] * py + e[11] * pz + e[15];
+      if (w <= kSmallestDepth) return [-1, -1, 1, 1]; // beside the camera or behind it
+      const along = (e[0] * px + e[4] * py + e[8] * pz + e[12]) / w;
+      const up = (e[1] * px + e[5] * py + e[9] * pz + e[13]) / w;
+      bounds[0] = Math.min(bounds[0], along);
+      bounds[1] = Math.min(bounds[1], up);
+      bounds[2] = Math.max(bounds[2], along);
+      bounds[3] = Math.max(bounds[3], up);
+    }
+  }
+  return bounds.map((bound) => Math.min(1, Math.max(-1, bound))) as [number, number, number, number];
 }

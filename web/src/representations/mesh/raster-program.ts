@@ -1,5 +1,6 @@
 // The program that draws the triangles of a part into the images that the passes read (passes.ts): which part is visible
-// in each pixel, at which distance, and its features there. Half-transparent triangles are drawn in a pixel if their
+// in each pixel, at which distance, and which place of its textures. Features are sampled later, once per pixel, as most
+// fragments are not visible in the end. Half-transparent triangles are drawn in a pixel if their
 // opacity is above its threshold (shaders/lib/dither_threshold.glsl), or, of solid surfaces, if it is at least one half.
 // Places are relative to the picture's reference point, so that single precision suffices.
 import * as THREE from 'three';
@@ -16,17 +17,26 @@ in vec3 position;  // the numbers of a corner
 uniform mat4 clipFromReference;
 uniform vec3 partOrigin;  // relative to the reference point
 uniform float partStep;
-out vec2 place;  // column and row in the patch, 0 to 1
+uniform vec2 patchLayout;  // texels along an edge of a patch, patches in a row
+uniform vec2 texelSize;  // as a share of the textures
+uniform uint firstLayer;
+out vec2 place;  // in the textures
 out vec3 fromReference;
-flat out int patchNumber;
+flat out uint layer;  // of ditherThreshold
 void main() {
-  int corner = gl_VertexID & 3;
-  patchNumber = gl_VertexID >> 2;
-  place = vec2(corner & 1, corner >> 1);
+  int corner = gl_VertexID & 3, patchNumber = gl_VertexID >> 2;
+  // Floating-point numbers suffice for the division, as patches are fewer than 2^18.
+  float row = floor((float(patchNumber) + 0.5) / patchLayout.y);
+  vec2 first = patchLayout.x * vec2(float(patchNumber) - patchLayout.y * row, row) + 0.5;
+  place = texelSize * (first + (patchLayout.x - 1.0) * vec2(corner & 1, corner >> 1));
+  // The last vertex of a triangle counts: corner 2 of the first triangle, 1 of the second one.
+  layer = firstLayer + 2u * uint(patchNumber) + (corner == 1 ? 1u : 0u);
   fromReference = partOrigin + partStep * position;
   gl_Position = clipFromReference * vec4(fromReference, 1.0);
 }`;
 
+// Drivers for the CPU evaluate all branches and read uniforms slowly, so what is seldom needed is in a program of its own
+// (GENERAL): other objects, hidden boxes, limits of a content, fading, parallel projections.
 const kFragmentShader = `
 precision highp float;
 precision highp int;
@@ -34,35 +44,22 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 in vec2 place;
 in vec3 fromReference;
-flat in int patchNumber;
+flat in uint layer;
 #ifdef SOLID
 layout(location = 0) out uvec2 visible;  // number of the part, counted from 1; bits of the distance
 #elif defined(LAYERS)
-layout(location = 0) out vec4 layer;
+layout(location = 0) out vec4 added;
 #else
-layout(location = 0) out vec4 featuresFirst;
-layout(location = 1) out vec4 featuresSecond;
-layout(location = 2) out uvec2 visible;
+// Number of the part, counted from 1, with kHalfTransparent; bits of the distance; of the place in the textures, of which
+// the last is replaced by the colour that a display mode shows.
+layout(location = 0) out uvec4 visible;
 #endif
-uniform sampler2DArray featureTexels, opacityTexels;
-uniform vec3 patchLayout;  // texels along an edge of a patch, patches in a row, number of the part
-uniform uint layers;  // number of the first triangle's layer (ditherThreshold)
-uniform sampler2D opaqueDepth;
+uniform sampler2DArray opacityTexels;
+uniform uint partNumber, frame;
 uniform vec4 part;
-uniform vec2 jitter;  // of the places that pixels show, in pixels
-uniform mat3 origin, ray;
-uniform vec4 depthRow, wRow;  // of the camera's projection
-uniform float sceneNear, visibility;
-uniform vec3 sceneLow, sceneHigh, withinLow, withinHigh;
-uniform bool isBackground, withinBox;
-uniform int display;
-uniform uint frame;
-uniform vec2 share;  // of the pixels, in which the part is drawn
-uniform int hiddenBoxes;
-uniform mat4 boxFromReference[${2 * kMaxHiddenBoxes}];
-
+uniform float sceneNear;
+uniform vec3 sceneLow, sceneHigh;
 const float kSceneEnd = 1e6;
-const uint kFadeLayer = 0xfadeu;  // of the thresholds between contents that fade into each other
 
 // Returns the distance from which on the background block is seen.
 float behindBox(vec3 o, vec3 d) {
@@ -72,6 +69,21 @@ float behindBox(vec3 o, vec3 d) {
   return from < to ? to : sceneNear;
 }
 
+#ifdef GENERAL
+uniform uint firstLayer;
+uniform sampler2D opaqueDepth;
+uniform vec2 jitter;  // of the places that pixels show, in pixels
+uniform mat3 origin, ray;
+uniform vec4 depthRow, wRow;  // of the camera's projection
+uniform float visibility;
+uniform vec3 withinLow, withinHigh;
+uniform bool withinBox;
+uniform int display;
+uniform vec2 share;  // of the pixels, in which the part is drawn
+uniform int hiddenBoxes;
+uniform mat4 boxFromReference[${2 * kMaxHiddenBoxes}];
+const uint kFadeLayer = 0xfadeu;  // of the thresholds between contents that fade into each other
+
 bool isHidden(vec3 x) {
   for (int n = 0; n < hiddenBoxes; ++n) {
     vec3 inBox = abs((boxFromReference[n] * vec4(x, 1.0)).xyz);
@@ -79,59 +91,71 @@ bool isHidden(vec3 x) {
   }
   return false;
 }
+#endif
+
+uint packColour(vec3 colour) {
+  uvec3 bytes = uvec3(255.0 * clamp(colour, 0.0, 1.0) + 0.5);
+  return bytes.r | bytes.g << 8 | bytes.b << 16;
+}
 
 void main() {
+#ifdef GENERAL
   vec2 ndc = 2.0 * (gl_FragCoord.xy + jitter - part.xy) / part.zw - 1.0;
   vec3 o = origin * vec3(ndc, 1.0), d = normalize(ray * vec3(ndc, 1.0));
   float distance = dot(fromReference - o, d);
-  if (!(distance > (isBackground ? behindBox(o, d) : sceneNear) && distance < kSceneEnd)) discard;
+#else
+  float distance = length(fromReference);  // the reference point is the eye
+  vec3 o = vec3(0.0), d = fromReference / distance;
+#endif
+#ifdef BACKGROUND
+  float from = behindBox(o, d);
+#else
+  float from = sceneNear;
+#endif
+  if (!(distance > from && distance < kSceneEnd)) discard;
+  float opacity = textureLod(opacityTexels, vec3(place, 0.0), 0.0).r;
+#ifdef GENERAL
   if (any(lessThan(fromReference, withinLow)) || any(greaterThanEqual(fromReference, withinHigh))) discard;
   float depth = dot(depthRow, vec4(fromReference, 1.0)) / dot(wRow, vec4(fromReference, 1.0));
   float opaque = texelFetch(opaqueDepth, min(ivec2(gl_FragCoord.xy), textureSize(opaqueDepth, 0) - 1), 0).r;
   if (opaque < 1.0 && 0.5 + 0.5 * depth > opaque) discard;
   if (hiddenBoxes > 0 && isHidden(fromReference)) discard;
-  int across = int(patchLayout.y);
-  vec2 texel = patchLayout.x * vec2(patchNumber % across, patchNumber / across) + 0.5 + (patchLayout.x - 1.0) * clamp(place, 0.0, 1.0);
-  vec2 at = texel / vec2(textureSize(opacityTexels, 0).xy);
-  float opacity = textureLod(opacityTexels, vec3(at, 0.0), 0.0).r;
   float outside = length(max(max(sceneLow - fromReference, fromReference - sceneHigh), 0.0));
   if (withinBox && outside > 0.0) discard;
   opacity *= 1.0 - smoothstep(0.1 * visibility, visibility, outside);
+#endif
 #ifdef SOLID
   if (opacity < 0.5) discard;
-  visible = uvec2(uint(patchLayout.z), floatBitsToUint(distance));
+  visible = uvec2(partNumber, floatBitsToUint(distance));
 #elif defined(LAYERS)
   if (opacity <= 0.0) discard;
-  layer = vec4(vec3(1.0 / 16.0), 1.0);
+  added = vec4(vec3(1.0 / 16.0), 1.0);
 #else
-  bool isSecond = place.x + place.y > 1.0;
-  uint number = uint(patchLayout.z), layer = layers + 2u * uint(patchNumber) + (isSecond ? 1u : 0u);
-  float threshold = ditherThreshold(uvec2(gl_FragCoord.xy - part.xy), frame, layer);
+  uvec2 pixel = uvec2(gl_FragCoord.xy - part.xy);
+  float threshold = ditherThreshold(pixel, frame, layer);
 #ifdef INSPECTED
   if (display == kShowAlpha) threshold = 0.0;
   if (display == kShowTriangles) threshold = 0.5;
 #endif
   if (opacity <= threshold) discard;
-  bool isFading = share.y - share.x < 1.0;
-  if (isFading) {
-    float between = ditherThreshold(uvec2(gl_FragCoord.xy - part.xy), frame, kFadeLayer);
+  bool isHalfTransparent = opacity < 1.0;
+#ifdef GENERAL
+  if (share.y - share.x < 1.0) {
+    float between = ditherThreshold(pixel, frame, kFadeLayer);
     if (between < share.x || between >= share.y) discard;
+    isHalfTransparent = true;
   }
-  visible = uvec2(number | (opacity < 1.0 || isFading ? ${kHalfTransparent}u : 0u), floatBitsToUint(distance));
-#ifdef BLOCK_TEXTURES
-  featuresFirst = vec4(textureLod(featureTexels, vec3(at, 0.0), 0.0).rg, textureLod(featureTexels, vec3(at, 1.0), 0.0).rg);
-  featuresSecond = vec4(textureLod(featureTexels, vec3(at, 2.0), 0.0).rg, textureLod(featureTexels, vec3(at, 3.0), 0.0).rg);
-#else
-  featuresFirst = textureLod(featureTexels, vec3(at, 0.0), 0.0);
-  featuresSecond = textureLod(featureTexels, vec3(at, 1.0), 0.0);
 #endif
+  visible.x = isHalfTransparent ? partNumber | ${kHalfTransparent}u : partNumber;
+  visible.y = floatBitsToUint(distance);
+  visible.zw = floatBitsToUint(place);
 #ifdef INSPECTED
-  if (display == kShowAlpha) featuresFirst.rgb = vec3(opacity);
+  if (display == kShowAlpha) visible.w = packColour(vec3(opacity));
   if (display == kShowTriangles) {
     vec3 normal = normalize(cross(dFdx(fromReference), dFdy(fromReference)));
-    float hue = fract(0.618034 * float(2 * patchNumber + (isSecond ? 1 : 0)));
+    float hue = fract(0.618034 * float(layer - firstLayer));
     vec3 tint = clamp(abs(fract(hue + vec3(0.0, 0.667, 0.333)) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
-    featuresFirst.rgb = mix(vec3(0.75), tint, 0.3) * (0.25 + 0.75 * abs(dot(normal, d)));
+    visible.w = packColour(mix(vec3(0.75), tint, 0.3) * (0.25 + 0.75 * abs(dot(normal, d))));
   }
 #endif
 #endif
@@ -140,16 +164,24 @@ void main() {
 // `inspected`: dithered, as a display mode shows them.
 export type RasterKind = 'dithered' | 'inspected' | 'solid' | 'layers';
 
-// Returns the material of a part, without uniforms. Programs depend on the kind and the form of textures alone.
-export function rasterMaterial(kind: RasterKind, isCompressed: boolean): THREE.RawShaderMaterial {
+// What a program of triangles depends on.
+export interface RasterForm {
+  kind: RasterKind;
+  isBackground: boolean;
+  isGeneral: boolean; // otherwise, nothing of GENERAL is needed; always for 'inspected'
+}
+
+// Returns the material of a part, without uniforms.
+export function rasterMaterial({ kind, isBackground, isGeneral }: RasterForm): THREE.RawShaderMaterial {
   const defines: Record<string, string> = {};
   if (kind === 'solid') defines.SOLID = '';
   if (kind === 'inspected') defines.INSPECTED = '';
   if (kind === 'layers') defines.LAYERS = '';
-  if (isCompressed) defines.BLOCK_TEXTURES = '';
+  if (isBackground) defines.BACKGROUND = '';
+  if (isGeneral) defines.GENERAL = '';
   return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
-    vertexShader: kVertexShader,
+    vertexShader: ['precision highp float;\nprecision highp int;', kVertexShader].join('\n'),
     // The shared source declares its integers without precision.
     fragmentShader: ['precision highp float;\nprecision highp int;', kModeConstants, ditherSource, kFragmentShader].join('\n'),
     defines,
