@@ -192,3 +192,41 @@ describe('resources that tiles share', () => {
     expect([gpu.bytes, streamer.statistics.gpuBytes, streamer.statistics.pageBytes]).toEqual([0, 0, 0]);
   });
 });
+
+describe('textures in blocks', () => {
+  // Returns whether contents of four tiles with these sizes of files are read for textures in blocks.
+  async function takesBlocks(gpu: string, bytes: number, gpuBytes: number, hasBlocks = true): Promise<boolean> {
+    const tree = testTree(1);
+    tree.tiles.forEach(({ content }) => (content!.bytes = bytes));
+    const read: boolean[] = [];
+    const codec = {
+      ...kCodec,
+      readHeader: (_: unknown, name: string, declared: unknown, limits: { blockTextures: boolean }) => {
+        expect([name, declared]).toBeDefined();
+        read.push(limits.blockTextures);
+        return { memoryBytes: kContentBytes };
+      },
+    } as unknown as ContentCodec;
+    const path = {
+      tileset: { representation: 'fake', resources: [] }, tree, gpuBytes: gpuBytes * tree.tiles.length,
+      files: { read: async () => new Uint8Array() }, drawer: { prepare: () => {}, residentBytes: () => kContentBytes },
+    } as unknown as ContentPath;
+    const context = { getExtension: () => ({ UNMASKED_RENDERER_WEBGL: 1 }), getParameter: (name?: number) => (name === 1 ? gpu : 256) };
+    const renderer = { getContext: () => context, extensions: { has: () => hasBlocks } } as unknown as THREE.WebGLRenderer;
+    await new ContentSource(path, renderer, codec).fetch(0, new AbortController().signal);
+    return read[0];
+  }
+  const onCpu = 'ANGLE (Mesa/X.org, llvmpipe (LLVM 15.0.6 256 bits), OpenGL 4.5)';
+
+  it('are for GPUs that sample them', async () => {
+    expect(await takesBlocks('ANGLE (NVIDIA GeForce RTX 4090)', 10, 1000)).toBe(true);
+    expect(await takesBlocks('ANGLE (NVIDIA GeForce RTX 4090)', 10, 1000, false)).toBe(false);
+  });
+
+  it('are for drivers for the CPU if bytes would not fit into the budget', async () => {
+    expect(await takesBlocks(onCpu, 10, 20)).toBe(false);
+    expect(await takesBlocks('ANGLE (Google, Vulkan 1.3.0 (SwiftShader Device (Subzero)), SwiftShader driver)', 10, 20)).toBe(false);
+    expect(await takesBlocks(onCpu, 10, 19.9)).toBe(true);
+    expect(await takesBlocks(onCpu, 0, 1000)).toBe(true); // the sizes are not known
+  });
+});

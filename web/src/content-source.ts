@@ -4,6 +4,7 @@ import type * as THREE from 'three';
 import type { DecodePool } from './decode-pool';
 import type { ContentPlace, DrawnContent, SceneDrawer } from './draw/scene-drawer';
 import { kBlockExtension } from './draw/sliced-textures';
+import { drawsOnCpu } from './draw/software-renderer';
 import { getCodec, type KnownRepresentation } from './representations/codecs';
 import type { ContentFile, SceneFiles } from './scene-files';
 import type { ResourceSource } from './stream/shared-resources';
@@ -15,6 +16,7 @@ import type { TileContent, Tileset } from './tiles/tileset';
 
 // Background blocks are drawn for a long time, and so are the coarsest tiles if there are at most this many.
 const kMaxDrawnForLong = 4;
+const kBytesOfBlocks = 2; // of a texture in bytes, relative to the same in blocks
 
 // What contents pass through on their way from file to GPU.
 export interface ContentPath {
@@ -23,6 +25,7 @@ export interface ContentPath {
   files: SceneFiles;
   pool: Pick<DecodePool, 'decode' | 'decodeResource'>;
   drawer: SceneDrawer;
+  gpuBytes: number; // budget for contents, when the scene is opened
 }
 
 export class ContentSource implements TileSource<ContentFile, Content, DrawnContent, Resource> {
@@ -45,7 +48,7 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
       edge3D: gl.getParameter(gl.MAX_3D_TEXTURE_SIZE) as number,
       layers: gl.getParameter(gl.MAX_ARRAY_TEXTURE_LAYERS) as number,
       uniformBytes: gl.getParameter(gl.MAX_UNIFORM_BLOCK_SIZE) as number,
-      blockTextures: renderer.extensions.has(kBlockExtension),
+      blockTextures: renderer.extensions.has(kBlockExtension) && !(drawsOnCpu(gl) && fitsInBytes(path)),
     };
     if (tileset.resources.length === 0) return;
     this.resources = {
@@ -104,4 +107,11 @@ export class ContentSource implements TileSource<ContentFile, Content, DrawnCont
     const { box, backgroundBlock } = this.tileContent(tile);
     return { box, backgroundBlock, number: tile, level: this.path.tree.tiles[tile].level, isDrawnForLong: this.drawnForLong.has(tile) };
   }
+}
+
+// Returns whether the whole scene surely fits into the budget with textures of bytes. Drivers for the CPU decode blocks each
+// time that they sample them, which takes longer than it saves.
+function fitsInBytes({ tree, gpuBytes }: Pick<ContentPath, 'tree' | 'gpuBytes'>): boolean {
+  const files = tree.tiles.flatMap(({ content }) => (content ? [content.bytes] : []));
+  return files.every((bytes) => bytes > 0) && kBytesOfBlocks * files.reduce((sum, bytes) => sum + bytes, 0) <= gpuBytes;
 }

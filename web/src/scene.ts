@@ -335,7 +335,8 @@ export class TesseraScene extends THREE.Object3D {
         this.onError(error);
         return undefined;
       }
-      const source = new ContentSource({ tileset: this.tileset, tree: this.tree, files: this.files, pool: this.pool, drawer: this.drawer }, renderer);
+      const { tileset, tree, files, pool, drawer, stream: { gpuBytes } } = this;
+      const source = new ContentSource({ tileset, tree, files, pool, drawer, gpuBytes }, renderer);
       this.streamer = new TileStreamer(new TileSelector(this.tree, this.selection), source, this.stream);
       this.streamer.onError = (error) => this.onError(error);
       this.mesh = cityMesh(this.drawer);
