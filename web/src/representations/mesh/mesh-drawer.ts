@@ -383,8 +383,8 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
         drawn.uniforms.partOrigin.value.set(...drawn.part.origin).sub(point);
         const limits = { low: low.toArray(), high: high.toArray() };
         const chunks = selectChunks(drawn.chunks, drawn.part, drawn.uniforms.partOrigin.value, halfSpaces, limits);
-        if (chunks.length === 0) continue;
         const rectangle = screenRectangle(chunks, drawn.part, drawn.uniforms.partOrigin.value, this.uniforms.clipFromReference.value);
+        if (!rectangle) continue;
         rectangles.set(drawn.coloured, joinRectangles(rectangle, rectangles.get(drawn.coloured) ?? rectangle));
         for (const run of joinRuns(chunks)) {
           const time = times.get(drawn) ?? 0;

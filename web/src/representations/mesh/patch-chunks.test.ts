@@ -72,13 +72,13 @@ describe('chunks of patches', () => {
       const selected = selectChunks(chunks, part, new THREE.Vector3(), visibleHalfSpaces(clip, false), kEverywhere);
       const runs = joinRuns(selected);
       const isSelected = (patch: number) => runs.some(({ first, patches }) => patch >= first && patch < first + patches);
-      const [left, bottom, right, top] = screenRectangle(selected, part, new THREE.Vector3(), clip);
+      const [left, bottom, right, top] = screenRectangle(selected, part, new THREE.Vector3(), clip) ?? [1, 1, -1, -1];
       if (right - left < 2 || top - bottom < 2) ++smaller;
       leftOut += chunks.filter(({ first }) => !isSelected(first)).length;
       for (let corner = 0; corner < 4 * 2048; corner += 5) {
         const [x, y, z] = vertices.subarray(3 * corner, 3 * corner + 3);
         const at = new THREE.Vector4(part.step * x, part.step * y, part.step * z, 1).applyMatrix4(clip);
-        if (!(at.w > 0 && Math.abs(at.x) <= at.w && Math.abs(at.y) <= at.w)) continue;
+        if (!(at.w > 0 && at.z >= -at.w && Math.abs(at.x) <= at.w && Math.abs(at.y) <= at.w)) continue;
         expect(isSelected(corner >> 2)).toBe(true);
         expect(at.x / at.w >= left && at.x / at.w <= right && at.y / at.w >= bottom && at.y / at.w <= top).toBe(true);
       }

@@ -75,28 +75,44 @@ export function joinRuns(chunks: readonly PatchChunk[]): PatchRun[] {
   return runs;
 }
 
-// Returns a rectangle that contains what chunks show in a picture. `clip`: of places relative to the same point as
-// `origin`.
+// Returns a rectangle that contains what chunks show in a picture, or nothing if they show nothing. `clip`: of places
+// relative to the same point as `origin`; what is nearer than its near plane is not shown.
 export function screenRectangle(
-  chunks: readonly PatchChunk[], { step }: Pick<MeshPart, 'step'>, origin: THREE.Vector3, clip: THREE.Matrix4,
-): ScreenRectangle {
-  const { elements: e } = clip;
+  chunks: readonly PatchChunk[], { step }: Pick<MeshPart, 'step'>, origin: THREE.Vector3, { elements: e }: THREE.Matrix4,
+): ScreenRectangle | undefined {
   const [x, y, z] = origin.toArray();
+  const corners = new Float64Array(4 * 8); // x, y, w, and the distance from the near plane
   const bounds: [number, number, number, number] = [1, 1, -1, -1];
+  const add = (along: number, up: number, w: number) => {
+    bounds[0] = Math.min(bounds[0], along / w);
+    bounds[1] = Math.min(bounds[1], up / w);
+    bounds[2] = Math.max(bounds[2], along / w);
+    bounds[3] = Math.max(bounds[3], up / w);
+  };
   for (const { low, high } of chunks) {
     for (let corner = 0; corner < 8; ++corner) {
       const px = x + step * (corner & 1 ? high : low)[0];
       const py = y + step * (corner & 2 ? high : low)[1];
       const pz = z + step * (corner & 4 ? high : low)[2];
+      const at = 4 * corner;
+      for (let row = 0; row < 2; ++row) corners[at + row] = e[row] * px + e[4 + row] * py + e[8 + row] * pz + e[12 + row];
       const w = e[3] * px + e[7] * py + e[11] * pz + e[15];
-      if (w <= kSmallestDepth) return [-1, -1, 1, 1]; // beside the camera or behind it
-      const along = (e[0] * px + e[4] * py + e[8] * pz + e[12]) / w;
-      const up = (e[1] * px + e[5] * py + e[9] * pz + e[13]) / w;
-      bounds[0] = Math.min(bounds[0], along);
-      bounds[1] = Math.min(bounds[1], up);
-      bounds[2] = Math.max(bounds[2], along);
-      bounds[3] = Math.max(bounds[3], up);
+      corners[at + 2] = w;
+      corners[at + 3] = e[2] * px + e[6] * py + e[10] * pz + e[14] + w;
+      if (corners[at + 3] >= 0) add(corners[at], corners[at + 1], Math.max(w, kSmallestDepth));
+    }
+    // Where the near plane cuts an edge.
+    for (let first = 0; first < 8; ++first) {
+      for (let bit = 1; bit < 8; bit *= 2) {
+        if (first & bit) continue;
+        const [a, b] = [4 * first, 4 * (first | bit)];
+        if (corners[a + 3] >= 0 === corners[b + 3] >= 0) continue;
+        const t = corners[a + 3] / (corners[a + 3] - corners[b + 3]);
+        const mix = (n: number) => corners[a + n] + t * (corners[b + n] - corners[a + n]);
+        add(mix(0), mix(1), Math.max(mix(2), kSmallestDepth));
+      }
     }
   }
-  return bounds.map((bound) => Math.min(1, Math.max(-1, bound))) as [number, number, number, number];
+  const [left, bottom, right, top] = bounds.map((bound) => Math.min(1, Math.max(-1, bound)));
+  return left < right && bottom < top ? [left, bottom, right, top] : undefined;
 }
