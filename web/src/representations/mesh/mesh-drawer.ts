@@ -16,7 +16,7 @@ import { kMeshModes } from './mesh-modes';
 import { MeshTargets } from './mesh-targets';
 import { MeshTextures } from './mesh-textures';
 import { kSortShader, kWholeScreen, PartColours, rectangleMaterial, type ColouredPart } from './part-colours';
-import { kBlendShader, kCopyShader, kSkyShader, passMaterial } from './passes';
+import { blendMaterial, kCopyShader, kSkyShader, passMaterial } from './passes';
 import { joinRuns, makeChunks, screenRectangle, selectChunks, visibleHalfSpaces, type PatchChunk, type ScreenRectangle } from './patch-chunks';
 import { bytesOfIndices, drawRange, patchGeometry } from './patch-geometry';
 import { distanceToBox, distanceToSides, jittered, frameJitter, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
@@ -101,8 +101,8 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.colours = new PartColours(renderer, this.uniforms);
     const ofNoPart = { ...this.uniforms, partNumber: { value: 0 }, rectangle: { value: new THREE.Vector4(...kWholeScreen) } };
     this.passes = {
-      sort: this.makePass(kSortShader), sky: this.colours.makeMesh(rectangleMaterial(kSkyShader, ofNoPart)),
-      blend: this.makePass(kBlendShader), copy: this.makePass(kCopyShader),
+      sort: this.makePass(passMaterial(kSortShader, this.uniforms)), sky: this.colours.makeMesh(rectangleMaterial(kSkyShader, ofNoPart)),
+      blend: this.makePass(blendMaterial(this.uniforms)), copy: this.makePass(passMaterial(kCopyShader, this.uniforms)),
     };
     Object.assign(this.passes.sort.material, { depthTest: true, depthWrite: true, depthFunc: THREE.AlwaysDepth });
     const { defines } = this.passes.blend.material;
@@ -258,8 +258,8 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     for (const { material } of [...Object.values(this.passes), ...this.prepared.values()]) material.dispose();
   }
 
-  private makePass(shader: string): TriangleMesh {
-    const mesh = new THREE.Mesh(this.screen, passMaterial(shader, this.uniforms));
+  private makePass(material: THREE.RawShaderMaterial): TriangleMesh {
+    const mesh = new THREE.Mesh(this.screen, material);
     mesh.frustumCulled = false;
     return mesh;
   }

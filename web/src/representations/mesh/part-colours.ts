@@ -8,7 +8,7 @@ import { drawsOnCpu } from '../../draw/software-renderer';
 import { networkVectors, packNetwork, type DenseLayer } from '../../tiles/network';
 import { kFeatures, type MeshPart } from './mesh-content';
 import type { PartTextures } from './mesh-textures';
-import { kPassHead } from './passes';
+import { kPassHead, kRayOfVertexSource } from './passes';
 import { kHalfTransparent, kModeConstants } from './raster-program';
 import type { ScreenRectangle } from './patch-chunks';
 
@@ -20,22 +20,23 @@ const kVectorsBeforeNetwork = kFeatures / 2 + 2; // ranges, colour of the block,
 const kMaxParts = 2 ** 18;
 const kPartsOfDepth = 2 ** 20;
 
-export const kPartDepthSource = `
+const kPartDepthSource = `
 // Returns the depth that stands for a part; 0: what shows none.
 float partDepth(uint number) {
   return float(number + 1u) / ${kPartsOfDepth}.0;
 }`;
 
 // The vertex shader of passes that colour a rectangle of the pixels of a part.
-export const kRectangleVertexShader = `
-precision highp float;
-precision highp int;
+const kRectangleVertexShader = `
+${kRayOfVertexSource}
 in vec3 position;
 uniform vec4 rectangle;  // two opposite corners, from -1 to 1
 uniform uint partNumber;
+out vec3 rayDirection;  // not normalised
 ${kPartDepthSource}
 void main() {
   gl_Position = vec4(mix(rectangle.xy, rectangle.zw, position.xy), 2.0 * partDepth(partNumber) - 1.0, 1.0);
+  rayDirection = ray * ndcOfVertex(gl_Position.xy);
 }`;
 
 // Sorts the pixels: writes the depths that stand for their parts.
@@ -75,6 +76,7 @@ function colourShader(network: DenseLayer[], isCompressed: boolean, isInspected:
 precision highp sampler2DArray;
 ${isInspected ? '#define INSPECTED' : ''}
 ${kModeConstants}
+in vec3 rayDirection;
 out vec4 colour;
 uniform usampler2D visible;
 uniform sampler2DArray featureTexels;
@@ -89,7 +91,7 @@ void main() {
   vec2 place = uintBitsToFloat(seen.zw);
   vec4 first = ${first}, second = ${second};
   vec4 f0 = ${vector(0)} + ${vector(2)} * first, f1 = ${vector(1)} + ${vector(3)} * second;
-  vec3 d = normalize(ray * vec3(pixelNdc(), 1.0));
+  vec3 d = normalize(rayDirection);
 #ifdef INSPECTED
   vec3 shown;
   if (display == kShowTriangles || display == kShowAlpha) {

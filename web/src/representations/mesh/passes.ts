@@ -9,29 +9,52 @@ precision highp float;
 precision highp int;
 precision highp sampler2D;
 precision highp usampler2D;
+`;
+
+// For vertex shaders: what is linear in a picture is interpolated, as drivers for the CPU read uniforms slowly.
+export const kRayOfVertexSource = `
+precision highp float;
+precision highp int;
 uniform vec4 part;
 uniform vec2 jitter;
 uniform mat3 origin, ray;
-vec2 pixelNdc() {
-  return 2.0 * (gl_FragCoord.xy + jitter - part.xy) / part.zw - 1.0;
-}
-`;
+vec3 ndcOfVertex(vec2 position) {
+  return vec3(position + 2.0 * jitter / part.zw, 1.0);
+}`;
 
-export function passMaterial(fragmentShader: string, uniforms: Record<string, THREE.IUniform>): THREE.RawShaderMaterial {
+// `rayDirection` is not normalised.
+const kBlendVertexShader = `
+${kRayOfVertexSource}
+in vec3 position;
+uniform mat4 previousClip;  // of places relative to the reference point, in the previous picture
+out vec3 rayDirection;
+out vec4 previousOrigin, previousDirection;
+void main() {
+  vec3 ndc = ndcOfVertex(position.xy);
+  rayDirection = ray * ndc;
+  previousOrigin = previousClip * vec4(origin * ndc, 1.0);
+  previousDirection = previousClip * vec4(rayDirection, 0.0);
+  gl_Position = vec4(position.xy, 0.0, 1.0);
+}`;
+
+export function passMaterial(
+  fragmentShader: string, uniforms: Record<string, THREE.IUniform>, vertexShader = kScreenVertexShader,
+): THREE.RawShaderMaterial {
   return new THREE.RawShaderMaterial({
-    glslVersion: THREE.GLSL3, vertexShader: kScreenVertexShader, fragmentShader, uniforms,
+    glslVersion: THREE.GLSL3, vertexShader, fragmentShader, uniforms,
     depthTest: false, depthWrite: false, blending: THREE.NoBlending, toneMapped: false,
   });
 }
 
 // Colours the pixels that show the sky: those that show no part.
 export const kSkyShader = `${kPassHead}
+in vec3 rayDirection;
 out vec4 colour;
 uniform sampler2D opaqueDepth, sky;
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   if (texelFetch(opaqueDepth, min(at, textureSize(opaqueDepth, 0) - 1), 0).r < 1.0) discard;
-  vec3 d = ray * vec3(pixelNdc(), 1.0), size = abs(d);
+  vec3 d = rayDirection, size = abs(d);
   int a = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   float along = d[a];
   int side = 2 * a + (along < 0.0 ? 1 : 0);
@@ -44,7 +67,9 @@ void main() {
 // Blends the frame with those before, and states the distance of the solid surface. The rules are those of
 // shaders/representations/mesh/blend_frames.comp. Whether a pixel of a moving picture is noisy is seen from the pixels
 // around it, as there is no list of its layers.
-export const kBlendShader = `${kPassHead}
+const kBlendShader = `${kPassHead}
+in vec3 rayDirection;
+in vec4 previousOrigin, previousDirection;
 layout(location = 0) out vec4 colourAndOpacity;
 layout(location = 1) out vec4 distanceAndOpacity;
 uniform sampler2D decoded, history;
@@ -52,8 +77,7 @@ uniform usampler2D visible, solid;
 uniform float weight;  // of this frame
 uniform bool hasHistory, isResting;
 uniform bool hasSurface;  // otherwise what is visible stands for the solid surface
-uniform mat4 previousClip;  // of places relative to the reference point, in the previous picture
-uniform vec4 previousPart;
+uniform vec4 part, previousPart;
 const float kLargestDeviation = 1.0;
 
 // Weights of four pixels in a row for a place between the middle ones (Catmull and Rom).
@@ -97,11 +121,8 @@ void main() {
         squares += colour * colour;
       }
     }
-    vec2 ndc = pixelNdc();
-    vec3 d = normalize(ray * vec3(ndc, 1.0));
     // The sky is infinitely far away.
-    vec4 place = seen.x == 0u ? vec4(d, 0.0) : vec4(origin * vec3(ndc, 1.0) + uintBitsToFloat(seen.y) * d, 1.0);
-    vec4 clip = previousClip * place;
+    vec4 clip = seen.x == 0u ? previousDirection : previousOrigin + uintBitsToFloat(seen.y) / length(rayDirection) * previousDirection;
     vec2 previous = clip.xy / clip.w;
     if ((flags & ${kHalfTransparent}u) != 0u && clip.w > 0.0 && max(abs(previous.x), abs(previous.y)) <= 1.0) {
       vec4 mean = sum / 9.0, reach = kLargestDeviation * sqrt(max(squares / 9.0 - mean * mean, 0.0));
@@ -118,6 +139,10 @@ void main() {
 #endif
   distanceAndOpacity = surface.x == 0u ? vec4(0.0) : vec4(distance, 0.0, 0.0, 1.0);
 }`;
+
+export function blendMaterial(uniforms: Record<string, THREE.IUniform>): THREE.RawShaderMaterial {
+  return passMaterial(kBlendShader, uniforms, kBlendVertexShader);
+}
 
 export const kCopyShader = `${kPassHead}
 out vec4 copied;
