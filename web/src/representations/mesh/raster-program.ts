@@ -12,6 +12,8 @@ import { kMeshModes } from './mesh-modes';
 export const kModeConstants = displayConstants(kMeshModes);
 export const kHalfTransparent = 0x80000000; // set in the number of a part where its opacity is below 1
 
+// Thresholds are those of shaders/lib/dither_threshold.glsl, for other pixels and layers: what depends on the triangle is
+// computed once for each of its vertices, and what remains are half of the operations.
 const kVertexShader = `
 in vec3 position;  // the numbers of a corner
 uniform mat4 clipFromReference;
@@ -19,10 +21,13 @@ uniform vec3 partOrigin;  // relative to the reference point
 uniform float partStep;
 uniform vec2 patchLayout;  // texels along an edge of a patch, patches in a row
 uniform vec2 texelSize;  // as a share of the textures
-uniform uint firstLayer;
+uniform uint firstLayer, frame;
 out vec2 place;  // in the textures
 out vec3 fromReference;
-flat out uint layer;  // of ditherThreshold
+flat out uint layerSeed;
+#ifdef INSPECTED
+flat out uint triangle;
+#endif
 void main() {
   int corner = gl_VertexID & 3, patchNumber = gl_VertexID >> 2;
   // Floating-point numbers suffice for the division, as patches are fewer than 2^18.
@@ -30,7 +35,11 @@ void main() {
   vec2 first = patchLayout.x * vec2(float(patchNumber) - patchLayout.y * row, row) + 0.5;
   place = texelSize * (first + (patchLayout.x - 1.0) * vec2(corner & 1, corner >> 1));
   // The last vertex of a triangle counts: corner 2 of the first triangle, 1 of the second one.
-  layer = firstLayer + 2u * uint(patchNumber) + (corner == 1 ? 1u : 0u);
+  uint number = 2u * uint(patchNumber) + (corner == 1 ? 1u : 0u);
+  layerSeed = scatterBits((firstLayer + number) ^ scatterBits(frame >> 6));
+#ifdef INSPECTED
+  triangle = number;
+#endif
   fromReference = partOrigin + partStep * position;
   gl_Position = clipFromReference * vec4(fromReference, 1.0);
 }`;
@@ -44,7 +53,10 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 in vec2 place;
 in vec3 fromReference;
-flat in uint layer;
+flat in uint layerSeed;
+#ifdef INSPECTED
+flat in uint triangle;
+#endif
 #ifdef SOLID
 layout(location = 0) out uvec2 visible;  // number of the part, counted from 1; bits of the distance
 #elif defined(LAYERS)
@@ -70,7 +82,6 @@ float behindBox(vec3 o, vec3 d) {
 }
 
 #ifdef GENERAL
-uniform uint firstLayer;
 uniform sampler2D opaqueDepth;
 uniform vec2 jitter;  // of the places that pixels show, in pixels
 uniform mat3 origin, ray;
@@ -132,7 +143,7 @@ void main() {
   added = vec4(vec3(1.0 / 16.0), 1.0);
 #else
   uvec2 pixel = uvec2(gl_FragCoord.xy - part.xy);
-  float threshold = ditherThreshold(pixel, frame, layer);
+  float threshold = ditherThreshold(uvec2(layerSeed ^ pixel.x ^ pixel.y << 16, 0), frame & 63u, 0u);
 #ifdef INSPECTED
   if (display == kShowAlpha) threshold = 0.0;
   if (display == kShowTriangles) threshold = 0.5;
@@ -153,7 +164,7 @@ void main() {
   if (display == kShowAlpha) visible.w = packColour(vec3(opacity));
   if (display == kShowTriangles) {
     vec3 normal = normalize(cross(dFdx(fromReference), dFdy(fromReference)));
-    float hue = fract(0.618034 * float(layer - firstLayer));
+    float hue = fract(0.618034 * float(triangle));
     vec3 tint = clamp(abs(fract(hue + vec3(0.0, 0.667, 0.333)) * 6.0 - 3.0) - 1.0, 0.0, 1.0);
     visible.w = packColour(mix(vec3(0.75), tint, 0.3) * (0.25 + 0.75 * abs(dot(normal, d))));
   }
@@ -181,8 +192,8 @@ export function rasterMaterial({ kind, isBackground, isGeneral }: RasterForm): T
   if (isGeneral) defines.GENERAL = '';
   return new THREE.RawShaderMaterial({
     glslVersion: THREE.GLSL3,
-    vertexShader: ['precision highp float;\nprecision highp int;', kVertexShader].join('\n'),
     // The shared source declares its integers without precision.
+    vertexShader: ['precision highp float;\nprecision highp int;', ditherSource, kVertexShader].join('\n'),
     fragmentShader: ['precision highp float;\nprecision highp int;', kModeConstants, ditherSource, kFragmentShader].join('\n'),
     defines,
     side: THREE.DoubleSide,
