@@ -8,7 +8,7 @@ import { drawsOnCpu } from '../../draw/software-renderer';
 import { networkVectors, packNetwork, type DenseLayer } from '../../tiles/network';
 import { kFeatures, type MeshPart } from './mesh-content';
 import type { PartTextures } from './mesh-textures';
-import { kPassHead, kRayOfVertexSource } from './passes';
+import { kNoisyOpacity, kPassHead, kRayOfVertexSource } from './passes';
 import { kHalfTransparent, kModeConstants } from './raster-program';
 import type { ScreenRectangle } from './patch-chunks';
 
@@ -109,7 +109,7 @@ void main() {
 #else
   vec3 shown = decode(f0, f1, d);
 #endif
-  colour = vec4(shown, 1.0);
+  colour = vec4(shown, (seen.x & ${kHalfTransparent}u) != 0u ? ${kNoisyOpacity} : 1.0);
 }`;
 }
 

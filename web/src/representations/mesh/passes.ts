@@ -2,7 +2,9 @@
 // with the frames before.
 import * as THREE from 'three';
 import { kScreenVertexShader } from '../../draw/screen-triangle';
-import { kHalfTransparent } from './raster-program';
+
+// Opacity of a pixel that shows something half-transparent, before frames are blended; it stands for 1.
+export const kNoisyOpacity = '(254.0 / 255.0)';
 
 export const kPassHead = `
 precision highp float;
@@ -99,22 +101,26 @@ vec4 mixHistory(vec2 position) {
   return sum;
 }
 
+vec4 withoutNote(vec4 colour) {
+  return vec4(colour.rgb, colour.a > 0.5 ? 1.0 : 0.0);
+}
+
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
-  vec4 frame = texelFetch(decoded, at, 0);
+  vec4 frame = withoutNote(texelFetch(decoded, at, 0));
   colourAndOpacity = frame;
   if (hasHistory && isResting) {
     colourAndOpacity = mix(texelFetch(history, at, 0), frame, weight);
   } else if (hasHistory) {
     uvec2 seen = texelFetch(visible, at, 0).xy;
     vec4 low = frame, high = frame, sum = vec4(0.0), squares = vec4(0.0);
-    uint flags = 0u;
+    bool isNoisy = false;
     ivec2 first = ivec2(part.xy), last = ivec2(part.xy + part.zw) - 1;
     for (int j = -1; j <= 1; ++j) {
       for (int i = -1; i <= 1; ++i) {
         ivec2 beside = clamp(at + ivec2(i, j), first, last);
-        vec4 colour = texelFetch(decoded, beside, 0);
-        flags |= texelFetch(visible, beside, 0).x;
+        vec4 noted = texelFetch(decoded, beside, 0), colour = withoutNote(noted);
+        isNoisy = isNoisy || (noted.a > 0.5 && noted.a < 0.999);
         low = min(low, colour);
         high = max(high, colour);
         sum += colour;
@@ -124,7 +130,7 @@ void main() {
     // The sky is infinitely far away.
     vec4 clip = seen.x == 0u ? previousDirection : previousOrigin + uintBitsToFloat(seen.y) / length(rayDirection) * previousDirection;
     vec2 previous = clip.xy / clip.w;
-    if ((flags & ${kHalfTransparent}u) != 0u && clip.w > 0.0 && max(abs(previous.x), abs(previous.y)) <= 1.0) {
+    if (isNoisy && clip.w > 0.0 && max(abs(previous.x), abs(previous.y)) <= 1.0) {
       vec4 mean = sum / 9.0, reach = kLargestDeviation * sqrt(max(squares / 9.0 - mean * mean, 0.0));
       vec4 before = mixHistory(previousPart.xy + (0.5 + 0.5 * previous) * previousPart.zw);
       colourAndOpacity = mix(clamp(before, max(low, mean - reach), min(high, mean + reach)), frame, weight);
