@@ -43,7 +43,8 @@
 #                read, memory, and seconds until the image is complete, inferred on the CPU and on the GPU
 #   flight       a city of 4x4 blocks, barely trained, in a flight of 600 steps with a quarter of the finest level's memory, through
 #                Vulkan with stored and with inferred maps, and in the browser with stored ones: never over the budget, never
-#                blank; and the first image of the scene of `maps` in the browser, on networks of several speeds
+#                blank; the memory of the scene of `maps` with room for everything, and its first image in the browser, on networks
+#                of several speeds
 #   mobilenerf   only with JAX3D: that scene as `tessera export --format mobilenerf` writes it, in the viewer of MobileNeRF's authors, in
 #                the same browser at that viewer's own size, 1256x828: images against those on the CPU, the frame times of both viewers
 #                in turns, and bytes. JAX3D is a copy of https://github.com/google-research/jax3d, whose page
@@ -690,6 +691,9 @@ flight() {
     verdict "$kind maps, blank frames" "$(jq .blank_frames "$result")" '<=' 0
     verdict "$kind maps, evictions" "$(jq .evictions "$result")" '>=' 1
   done
+  result=$work/memory.json
+  [ -s "$result" ] || "$program" "$work/city-stored.scene" memory > "$result"
+  jq -c . "$result"
   tools/install-debian-packages.sh --browser
   tools/build-web.sh
   local root=$PWD

@@ -2,7 +2,9 @@
 // contents have a quarter of the memory of the finest level. Prints JSON: the largest memory of contents, of the
 // drawer's own and of all that was allocated (counted at vkAllocateMemory), blank frames, and the levels drawn.
 // mesh_flight STORED INFERRED: the same place with stored and with inferred maps: how similar the images are, and for
-// each the bytes of the files that were read, memory, and the time until the image is complete. See mesh.sh.
+// each the bytes of the files that were read, memory, and the time until the image is complete.
+// mesh_flight SCENE memory: with room for everything, the memory of contents, of all on the GPU, and of the process, at
+// rest and in a flight; the area of the place, the number of texels of its finest level, and their size. See mesh.sh.
 #include <fmt/format.h>
 #include <volk.h>
 
@@ -15,8 +17,10 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <set>
+#include <string_view>
 
 #include "base/error.h"
+#include "base/memory.h"
 #include "eval/psnr.h"
 #include "gpu/context.h"
 #include "gpu/heap.h"
@@ -115,6 +119,21 @@ class Place {
       if (tileset_.tiles[tile].level == level && scene.tree.tiles[tile].hasContent)
         bytes += scene.source.bytes(static_cast<int>(tile));
     return bytes;
+  }
+  double squareMetres() const { return (frame_.high - frame_.low).head<2>().prod() * frame_.scale * frame_.scale; }
+  // Returns the number of texels in the contents of the finest level, and the smallest edge of one in metres.
+  std::pair<uint64_t, double> texels() const {
+    const TileScene scene = open();
+    uint64_t texels = 0;
+    double edge = INFINITY;
+    for (size_t tile = 0; tile < tileset_.tiles.size(); ++tile) {
+      if (tileset_.tiles[tile].level != 0 || !scene.tree.tiles[tile].hasContent) continue;
+      edge = std::min(edge, tileset_.tiles[tile].geometricError);  // which is in metres
+      const std::unique_ptr<Content> content = scene.source.load(static_cast<int>(tile));
+      const auto* mesh = dynamic_cast<const ContentOf<MeshContent>*>(content.get());
+      for (const PatchSet& part : mesh->value.parts) texels += part.featureBlocks[0].size() / PatchSet::kBc5Bytes * 16;
+    }
+    return {texels, edge};
   }
   // Adds the file of each content that is read, and once those of its resources, to `bytes`.
   TileScene openCounted(std::atomic<uint64_t>& bytes) const {
@@ -245,19 +264,56 @@ nlohmann::ordered_json compare(const Place& stored, const Place& inferred) {
   return result;
 }
 
+nlohmann::ordered_json weigh(const Place& place) {
+  const auto context = GpuContext::open();
+  AllocationCount::begin();
+  const auto stream = std::make_shared<GpuStream>(context);
+  GpuRendererSettings settings;
+  settings.budgetBytes = uint64_t{4} << 30;
+  settings.poolBytes = kPoolBytes;
+  settings.inBackground = true;
+  settings.draw.exact = false;
+  settings.selection.maximumScreenSpaceError = 0;  // the finest level everywhere
+  const size_t before = context->heap().bytesInUse();
+  const int64_t residentBefore = residentBytes();
+  GpuSceneRenderer gpu(stream, makeGpuMeshDrawer(stream), place.open(), settings);
+  const auto described = [&] {
+    return nlohmann::ordered_json{{"bytes_of_contents", gpu.state().cache.bytes},
+                                  {"bytes_in_use", context->heap().bytesInUse() - before},
+                                  {"most_bytes_allocated", AllocationCount::most()},
+                                  {"resident_bytes_of_process", residentBytes() - residentBefore},
+                                  {"most_resident_bytes_of_process", peakResidentBytes() - residentBefore}};
+  };
+  drawUntilComplete(gpu, place, place.along(0));
+  nlohmann::ordered_json result = {{"device", context->name()}, {"square_metres", place.squareMetres()}};
+  result["at_rest"] = described();
+  constexpr int kSteps = 60;
+  for (int step = 0; step < kSteps; ++step) {
+    gpu.draw(place.camera(), place.along(static_cast<double>(step) / kSteps));
+    gpu.lastImage();
+  }
+  result["after_a_flight"] = described();
+  const auto [texels, edge] = place.texels();
+  result["texels"] = texels;
+  result["metres_of_texel"] = edge;
+  return result;
+}
+
 int run(int argc, char** argv) {
   if (argc < 2 || argc > 3) {
-    std::fprintf(stderr, "usage: mesh_flight SCENE [STEPS] or mesh_flight STORED INFERRED\n");
+    std::fprintf(stderr, "usage: mesh_flight SCENE [STEPS | memory] or mesh_flight STORED INFERRED\n");
     return 2;
   }
   const bool hasSecond = argc == 3 && fs::exists(fs::path(argv[2]) / "tileset.json");
-  const int steps = argc == 3 && !hasSecond ? std::atoi(argv[2]) : 600;
+  const bool weighs = argc == 3 && std::string_view(argv[2]) == "memory";
+  const int steps = argc == 3 && !hasSecond && !weighs ? std::atoi(argv[2]) : 600;
   if (steps < 1) {
     std::fprintf(stderr, "mesh_flight: %s is neither a scene nor a number of steps\n", argv[2]);
     return 2;
   }
-  const nlohmann::ordered_json result =
-      hasSecond ? compare(Place(argv[1]), Place(argv[2])) : fly(Place(argv[1]), steps);
+  const nlohmann::ordered_json result = hasSecond ? compare(Place(argv[1]), Place(argv[2]))
+                                        : weighs  ? weigh(Place(argv[1]))
+                                                  : fly(Place(argv[1]), steps);
   std::printf("%s\n", result.dump(2).c_str());
   return 0;
 }
