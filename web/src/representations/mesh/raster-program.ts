@@ -13,7 +13,8 @@ export const kModeConstants = displayConstants(kMeshModes);
 export const kHalfTransparent = 0x80000000; // set in the number of a part where its opacity is below 1
 
 // Thresholds are those of shaders/lib/dither_threshold.glsl, for other pixels and layers: what depends on the triangle is
-// computed once for each of its vertices, and what remains are half of the operations.
+// computed once for each of its vertices, and what remains are half of the operations. What fragments need of uniforms
+// comes from the vertices, too, as drivers for the CPU read uniforms slowly.
 const kVertexShader = `
 in vec3 position;  // the numbers of a corner
 uniform mat4 clipFromReference;
@@ -21,10 +22,12 @@ uniform vec3 partOrigin;  // relative to the reference point
 uniform float partStep;
 uniform vec2 patchLayout;  // texels along an edge of a patch, patches in a row
 uniform vec2 texelSize;  // as a share of the textures
-uniform uint firstLayer, frame;
+uniform uint firstLayer, frame, partNumber;
+uniform vec4 part;
+uniform float sceneNear;
 out vec2 place;  // in the textures
 out vec3 fromReference;
-flat out uint layerSeed;
+flat out uvec4 numbers;  // seed of the layer in the pixel (0, 0) of the image; of the part; of the frame, from 0 to 63; bits of sceneNear
 #ifdef INSPECTED
 flat out uint triangle;
 #endif
@@ -36,7 +39,9 @@ void main() {
   place = texelSize * (first + (patchLayout.x - 1.0) * vec2(corner & 1, corner >> 1));
   // The last vertex of a triangle counts: corner 2 of the first triangle, 1 of the second one.
   uint number = 2u * uint(patchNumber) + (corner == 1 ? 1u : 0u);
-  layerSeed = scatterBits((firstLayer + number) ^ scatterBits(frame >> 6));
+  // Pixels count from the corner of the picture.
+  uint seed = scatterBits((firstLayer + number) ^ scatterBits(frame >> 6)) - uint(part.x) - (uint(part.y) << 16);
+  numbers = uvec4(seed, partNumber, frame & 63u, floatBitsToUint(sceneNear));
 #ifdef INSPECTED
   triangle = number;
 #endif
@@ -53,7 +58,7 @@ precision highp sampler2D;
 precision highp sampler2DArray;
 in vec2 place;
 in vec3 fromReference;
-flat in uint layerSeed;
+flat in uvec4 numbers;
 #ifdef INSPECTED
 flat in uint triangle;
 #endif
@@ -67,9 +72,6 @@ layout(location = 0) out vec4 added;
 layout(location = 0) out uvec4 visible;
 #endif
 uniform sampler2DArray opacityTexels;
-uniform uint partNumber, frame;
-uniform vec4 part;
-uniform float sceneNear;
 uniform vec3 sceneLow, sceneHigh;
 const float kSceneEnd = 1e6;
 
@@ -77,11 +79,13 @@ const float kSceneEnd = 1e6;
 float behindBox(vec3 o, vec3 d) {
   vec3 a = (sceneLow - o) / d, b = (sceneHigh - o) / d;
   vec3 first = min(a, b), last = max(a, b);
-  float from = max(max(first.x, first.y), max(first.z, sceneNear)), to = min(min(last.x, last.y), min(last.z, kSceneEnd));
+  float sceneNear = uintBitsToFloat(numbers.w), from = max(max(first.x, first.y), max(first.z, sceneNear)), to = min(min(last.x, last.y), min(last.z, kSceneEnd));
   return from < to ? to : sceneNear;
 }
 
 #ifdef GENERAL
+uniform vec4 part;
+uniform uint frame;
 uniform sampler2D opaqueDepth;
 uniform vec2 jitter;  // of the places that pixels show, in pixels
 uniform mat3 origin, ray;
@@ -121,7 +125,7 @@ void main() {
 #ifdef BACKGROUND
   float from = behindBox(o, d);
 #else
-  float from = sceneNear;
+  float from = uintBitsToFloat(numbers.w);
 #endif
   if (!(distance > from && distance < kSceneEnd)) discard;
   float opacity = textureLod(opacityTexels, vec3(place, 0.0), 0.0).r;
@@ -137,13 +141,13 @@ void main() {
 #endif
 #ifdef SOLID
   if (opacity < 0.5) discard;
-  visible = uvec2(partNumber, floatBitsToUint(distance));
+  visible = uvec2(numbers.y, floatBitsToUint(distance));
 #elif defined(LAYERS)
   if (opacity <= 0.0) discard;
   added = vec4(vec3(1.0 / 16.0), 1.0);
 #else
-  uvec2 pixel = uvec2(gl_FragCoord.xy - part.xy);
-  float threshold = ditherThreshold(uvec2(layerSeed ^ pixel.x ^ pixel.y << 16, 0), frame & 63u, 0u);
+  uvec2 pixel = uvec2(gl_FragCoord.xy);
+  float threshold = ditherThreshold(uvec2(numbers.x + pixel.x + (pixel.y << 16), 0), numbers.z & 63u, 0u);
 #ifdef INSPECTED
   if (display == kShowAlpha) threshold = 0.0;
   if (display == kShowTriangles) threshold = 0.5;
@@ -152,12 +156,12 @@ void main() {
   bool isHalfTransparent = opacity < 1.0;
 #ifdef GENERAL
   if (share.y - share.x < 1.0) {
-    float between = ditherThreshold(pixel, frame, kFadeLayer);
+    float between = ditherThreshold(pixel - uvec2(part.xy), frame, kFadeLayer);
     if (between < share.x || between >= share.y) discard;
     isHalfTransparent = true;
   }
 #endif
-  visible.x = isHalfTransparent ? partNumber | ${kHalfTransparent}u : partNumber;
+  visible.x = isHalfTransparent ? numbers.y | ${kHalfTransparent}u : numbers.y;
   visible.y = floatBitsToUint(distance);
   visible.zw = floatBitsToUint(place);
 #ifdef INSPECTED
