@@ -7,17 +7,32 @@ import { screenTriangle } from './screen-triangle';
 
 export const kFirstRenderOrder = -1e9; // first of the transparent objects
 
+// What is linear in a picture is interpolated, as drivers for the CPU read uniforms slowly.
 const kVertexShader = `
+uniform vec4 part;
+uniform vec2 resolution;
+uniform mat3 origin, ray;
+uniform mat4 clipFromScene;
+varying vec2 place;  // in the image
+flat varying vec4 placeLimits;
+varying vec3 rayDirection;  // not normalised
+varying vec4 clipAlongRay;  // depth and w at its origin; their increases along rayDirection
 void main() {
+  vec3 ndc = vec3(position.xy, 1.0);
+  place = (part.xy + (0.5 + 0.5 * ndc.xy) * part.zw) / resolution;
+  // Filtering must never read texels of another picture.
+  placeLimits = vec4(part.xy + 0.5, part.xy + part.zw - 0.5) / resolution.xyxy;
+  rayDirection = ray * ndc;
+  clipAlongRay = vec4((clipFromScene * vec4(origin * ndc, 1.0)).zw, (clipFromScene * vec4(rayDirection, 0.0)).zw);
   gl_Position = vec4(position.xy, 0.0, 1.0);
 }`;
 
 const kFragmentShader = `
 uniform sampler2D colourAndOpacity, distanceAndOpacity;
-uniform vec4 viewport, part;
-uniform vec2 resolution;
-uniform mat3 origin, ray;
-uniform mat4 clipFromScene;
+varying vec2 place;
+flat varying vec4 placeLimits;
+varying vec3 rayDirection;
+varying vec4 clipAlongRay;
 uniform sampler2D opaqueDepth;
 uniform int display;
 // Maps 0 (near) to 1 (far) to a colour ramp with two intermediate colours.
@@ -27,22 +42,18 @@ vec3 colourOfDistance(float x) {
   return mix(colour, vec3(0.08, 0.07, 0.3), clamp(3.0 * x - 2.0, 0.0, 1.0));
 }
 void main() {
-  vec2 inPicture = (gl_FragCoord.xy - viewport.xy) / viewport.zw;
-  // Clamped so that filtering never reads texels of another picture.
-  vec2 place = clamp(part.xy + inPicture * part.zw, part.xy + 0.5, part.xy + part.zw - 0.5) / resolution;
-  vec4 colour = texture2D(colourAndOpacity, place);
-  vec4 far = texture2D(distanceAndOpacity, place);
-  float opaque = texture2D(opaqueDepth, place).r;
+  vec2 at = clamp(place, placeLimits.xy, placeLimits.zw);
+  vec4 colour = texture2D(colourAndOpacity, at);
+  vec4 far = texture2D(distanceAndOpacity, at);
+  float opaque = texture2D(opaqueDepth, at).r;
   gl_FragDepth = opaque;
   if (far.a > 0.99) {  // at least half of what is behind is hidden
-    vec2 ndc = 2.0 * inPicture - 1.0;
     float surface = far.r / far.a;
 #ifdef DISTANCES_OF_BYTES
     surface /= max(1.0 - surface, 1e-3);
 #endif
-    vec3 x = origin * vec3(ndc, 1.0) + surface * normalize(ray * vec3(ndc, 1.0));
-    vec4 clip = clipFromScene * vec4(x, 1.0);
-    gl_FragDepth = min(opaque, clamp(0.5 + 0.5 * clip.z / clip.w, 0.0, 1.0));
+    vec2 clip = clipAlongRay.xy + surface / length(rayDirection) * clipAlongRay.zw;
+    gl_FragDepth = min(opaque, clamp(0.5 + 0.5 * clip.x / clip.y, 0.0, 1.0));
     // The ramp spans seven octaves, from a tenth of half a block's edge on.
     if (display == kShowDepth) colour.rgb = colour.a * colourOfDistance(clamp(log2(surface / 0.1) / 7.0, 0.0, 1.0));
   }
@@ -60,7 +71,6 @@ export function cityMesh(drawn: DrawnPicture): THREE.Mesh<THREE.BufferGeometry, 
     uniforms: {
       colourAndOpacity: { value: colour },
       distanceAndOpacity: { value: distance },
-      viewport: { value: new THREE.Vector4() }, // the viewport that three.js renders into
       part: { value: new THREE.Vector4() },
       clipFromScene: { value: new THREE.Matrix4() },
       origin: { value: new THREE.Matrix3() },
@@ -86,9 +96,8 @@ export function cityMesh(drawn: DrawnPicture): THREE.Mesh<THREE.BufferGeometry, 
   mesh.renderOrder = kFirstRenderOrder;
   mesh.raycast = () => {};
   // Cameras other than those that were rendered show the first picture.
-  mesh.onBeforeRender = (renderer, _, camera) => {
+  mesh.onBeforeRender = (_renderer, _scene, camera) => {
     const { uniforms } = material;
-    renderer.getCurrentViewport(uniforms.viewport.value);
     const { part, origin, ray, clipFromScene } = drawn.pictures.find((one) => one.camera === camera) ?? drawn.pictures[0];
     for (const [name, value] of Object.entries({ part, origin, ray, clipFromScene })) uniforms[name].value = value;
     material.uniformsNeedUpdate = true; // for each camera rather than once a frame
