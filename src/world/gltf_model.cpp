@@ -43,16 +43,46 @@ struct PlaceRule {
   }
 };
 
-json parseGltf(std::string_view text, const ModelAssembler& to) {
-  size_t values = 0;
-  const auto limit = [&](int depth, json::parse_event_t, json&) {
-    if (depth > kDeepestJson) to.refuse("", "is nested too deep", kExportModelAgain);
-    if (++values > kMaxJsonValues) to.refuse("", "has too many values", kExportModelAgain);
+// Counts the values of a text, and stops where it is nested too deep or has too many.
+class GltfSize final : public nlohmann::json_sax<json> {
+ public:
+  bool isTooDeep() const { return depth_ > kDeepestJson; }
+  bool isTooLarge() const { return values_ > kMaxJsonValues; }
+
+  bool null() override { return count(); }
+  bool boolean(bool) override { return count(); }
+  bool number_integer(number_integer_t) override { return count(); }
+  bool number_unsigned(number_unsigned_t) override { return count(); }
+  bool number_float(number_float_t, const string_t&) override { return count(); }
+  bool string(string_t&) override { return count(); }
+  bool binary(binary_t&) override { return count(); }
+  bool key(string_t&) override { return count(); }
+  bool start_object(std::size_t) override { return begin(); }
+  bool start_array(std::size_t) override { return begin(); }
+  bool end_object() override { return end(); }
+  bool end_array() override { return end(); }
+  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override { return false; }
+
+ private:
+  bool count() { return ++values_ <= kMaxJsonValues; }
+  bool begin() { return ++depth_ <= kDeepestJson && count(); }
+  bool end() {
+    --depth_;
     return true;
-  };
-  json gltf = json::parse(text, limit, false);
-  if (gltf.is_discarded()) to.refuse("", "is not a glTF file, or is cut off", kExportModelAgain);
-  return gltf;
+  }
+
+  int depth_ = 0;
+  size_t values_ = 0;
+};
+
+json parseGltf(std::string_view text, const ModelAssembler& to) {
+  // A pass of its own: parsing with a callback takes time that grows with the square of the length.
+  GltfSize size;
+  const bool isJson = json::sax_parse(text, &size);
+  if (size.isTooDeep()) to.refuse("", "is nested too deep", kExportModelAgain);
+  if (size.isTooLarge()) to.refuse("", "has too many values", kExportModelAgain);
+  if (!isJson) to.refuse("", "is not a glTF file, or is cut off", kExportModelAgain);
+  return json::parse(text);
 }
 
 class GltfReader {

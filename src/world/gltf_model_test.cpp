@@ -224,7 +224,7 @@ TEST(GltfModel, TakesLittleTimeAndMemoryWhateverAFileClaims) {
     return Bytes(bytes.begin(), bytes.end());
   };
   EXPECT_THROW(readModel("a.gltf", reader), Error);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
 }
 
 TEST(GltfModel, OfGlbIsReadWholeOrRefused) {
