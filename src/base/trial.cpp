@@ -27,7 +27,7 @@ namespace tessera {
 namespace {
 
 constexpr size_t kLongestText = 4000;
-constexpr int kFailed = 1, kOutOfMemory = 2;
+constexpr int kFailed = 1, kFailedWithoutText = 2;
 
 // Returns the address space that this process uses, in bytes.
 uint64_t addressSpace() {
@@ -48,7 +48,9 @@ void limitCopy(const TrialLimits& limits, uint64_t space) {
 #else
   (void)space;
 #endif
-  for (const int fault : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGINT, SIGTERM}) ::signal(fault, SIG_DFL);
+  for (const int fault : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGXCPU, SIGALRM, SIGINT, SIGTERM})
+    ::signal(fault, SIG_DFL);
+  ::alarm(2 * static_cast<unsigned>(limits.seconds));  // it may wait for what another thread held at the fork
 }
 
 }  // namespace
@@ -65,18 +67,22 @@ std::string tryInCopy(const std::function<std::string()>& attempt, const TrialLi
     try {
       const std::string failure = attempt().substr(0, kLongestText);
       if (!failure.empty()) status = kFailed;
-      if (::pwrite(text.get(), failure.data(), failure.size(), 0) < 0) status = kOutOfMemory;
-    } catch (const std::bad_alloc&) {
-      status = kOutOfMemory;
+      if (::pwrite(text.get(), failure.data(), failure.size(), 0) < 0) status = kFailedWithoutText;
+    } catch (...) {
+      status = kFailedWithoutText;
     }
     ::_exit(status);
   }
   int status = 0;
-  while (::waitpid(copy, &status, 0) < 0 && errno == EINTR) {
-  }
+  pid_t ended = -1;
+  do {
+    ended = ::waitpid(copy, &status, 0);
+  } while (ended < 0 && errno == EINTR);
+  if (ended != copy) return fmt::format("how it ended is not known: {}", std::strerror(errno));
   if (WIFSIGNALED(status)) {
     const int signal = WTERMSIG(status);
-    if (signal == SIGXCPU || signal == SIGKILL) return fmt::format("it takes longer than {} s", limits.seconds);
+    if (signal == SIGXCPU || signal == SIGALRM) return fmt::format("it takes longer than {} s", limits.seconds);
+    if (signal == SIGKILL) return "it takes too long, or more memory than there is";
     return fmt::format("it ends with a fault ({})", ::strsignal(signal));
   }
   const int code = WEXITSTATUS(status);

@@ -91,6 +91,14 @@ const json* element(const json& gltf, const char* kind, uint64_t index) {
   return all != nullptr && index < all->size() ? &(*all)[index] : nullptr;
 }
 
+// Returns where the numbers of a part of a sparse accessor are, without whatever else the file says there.
+json placeAlone(const json& object) {
+  json place = json::object();
+  for (const char* key : {"bufferView", "byteOffset"})
+    if (const auto value = getUnsigned(object, key)) place[key] = *value;
+  return place;
+}
+
 }  // namespace
 
 struct GltfAccessors::Numbers {
@@ -215,7 +223,7 @@ std::vector<float> GltfAccessors::floats(uint64_t index, size_t components, std:
   const std::vector<uint32_t> replaced = sparseIndices(accessor, place);
   Numbers replacing;
   if (!replaced.empty()) {
-    json what = accessor["sparse"]["values"];
+    json what = placeAlone(accessor["sparse"]["values"]);
     what["type"] = accessor["type"];
     what["componentType"] = accessor["componentType"];
     what["count"] = replaced.size();
@@ -240,11 +248,12 @@ std::vector<uint32_t> GltfAccessors::sparseIndices(const json& accessor, const s
   const json* where = getField(*sparse, "indices");
   const json* what = getField(*sparse, "values");
   const auto count = getUnsigned(*sparse, "count");
-  if (where == nullptr || what == nullptr || !count || getField(*where, "bufferView") == nullptr ||
-      getField(*what, "bufferView") == nullptr) {
+  if (where == nullptr || what == nullptr || !count || !getUnsigned(*where, "bufferView") ||
+      !getUnsigned(*what, "bufferView")) {
     refuse(place, "has a sparse part that is cut off");
   }
-  json indices = *where;
+  json indices = placeAlone(*where);
+  indices["componentType"] = getUnsigned(*where, "componentType").value_or(0);
   indices["type"] = "SCALAR";
   indices["count"] = *count;
   std::vector<uint32_t> elements = integers(indices, place + ".sparse.indices");
@@ -268,7 +277,10 @@ std::vector<uint32_t> GltfAccessors::integers(const json& accessor, const std::s
 
 std::vector<uint32_t> GltfAccessors::indices(uint64_t index) const {
   count(index);
-  return integers(*element(gltf_, "accessors", index), fmt::format("accessors[{}]", index));
+  const json& accessor = *element(gltf_, "accessors", index);
+  const std::string place = fmt::format("accessors[{}]", index);
+  if (getField(accessor, "sparse") != nullptr) refuse(place, "has sparse indices, which are not read");
+  return integers(accessor, place);
 }
 
 void GltfAccessors::spend(uint64_t work) const {

@@ -27,6 +27,8 @@ class GltfAccessors {
   // Returns all of its elements, which must be unsigned integers.
   std::vector<uint32_t> indices(uint64_t index) const;
   std::span<const std::byte> view(uint64_t index) const;
+  // Counts work, in numbers that are read, and throws where a file asks for too much of it.
+  void spend(uint64_t work) const;
 
  private:
   struct Numbers;
@@ -34,7 +36,6 @@ class GltfAccessors {
   Numbers locate(const nlohmann::json& accessor, const std::string& place) const;
   std::vector<uint32_t> sparseIndices(const nlohmann::json& accessor, const std::string& place) const;
   std::vector<uint32_t> integers(const nlohmann::json& accessor, const std::string& place) const;
-  void spend(uint64_t work) const;
   [[noreturn]] void refuse(const std::string& place, const std::string& reason) const;
 
   const nlohmann::json& gltf_;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <numeric>
 
 #include "base/error.h"
@@ -106,18 +107,26 @@ class GltfReader {
     return all == nullptr ? kNone : *all;
   }
 
-  // Adds the image of a texture and returns its number in the model; -1 if there is none.
+  // Adds the image of a texture and returns its number in the model; -1 if it cannot be used.
   int addTexture(const json* info) {
     if (info == nullptr) return -1;
     const auto number = getUnsigned(*info, "index");
     if (!number || *number >= all("textures").size()) return -1;
     const auto source = getUnsigned(all("textures")[*number], "source");
-    if (!source || *source >= all("images").size()) return -1;
-    const json& image = all("images")[*source];
-    const std::string key = fmt::format("images[{}]", *source);
+    if (!source || *source >= all("images").size()) {  // of an extension, for example
+      return to_.addTexture(fmt::format("*textures[{}]", *number), {});
+    }
+    const auto known = images_.find(*source);
+    if (known != images_.end()) return known->second;
+    return images_[*source] = addImage(*source);
+  }
+
+  int addImage(uint64_t source) {
+    const json& image = all("images")[source];
+    const std::string key = fmt::format("images[{}]", source);
     if (const auto view = getUnsigned(image, "bufferView")) return to_.addTexture("*" + key, accessors_.view(*view));
     const std::string* uri = getString(image, "uri");
-    if (uri == nullptr) return -1;
+    if (uri == nullptr) return to_.addTexture("*" + key, {});
     if (!isDataUri(*uri)) return to_.addTexture(*uri);
     const auto bytes = decodeDataUri(*uri);
     return to_.addTexture("*" + key, bytes ? std::span<const std::byte>(*bytes) : std::span<const std::byte>());
@@ -275,11 +284,12 @@ class GltfReader {
   }
 
   void addPrimitive(const json& primitive, const std::string& place, const Mat4d& toModel) {
+    accessors_.spend(100);
     const uint32_t mode = getUnsigned(primitive, "mode").value_or(kTriangles);
     if (mode != kTriangles && mode != kStrip && mode != kFan) return;  // points or lines
     const json* attributes = getField(primitive, "attributes");
     const auto positions = attributes == nullptr ? std::nullopt : getUnsigned(*attributes, "POSITION");
-    if (!positions) refuse(place, "has no positions");
+    if (!positions) return;
     const uint64_t count = accessors_.count(*positions);
     const bool isIndexed = getField(primitive, "indices") != nullptr;
     const auto indices = getUnsigned(primitive, "indices");
@@ -370,6 +380,7 @@ class GltfReader {
   std::vector<uint64_t> roots_;
   std::vector<PlaceRule> rules_;  // of each material
   std::optional<uint32_t> plain_;
+  std::map<uint64_t, int> images_;  // their textures
 };
 
 }  // namespace
@@ -387,17 +398,13 @@ void readGltf(const Bytes& file, ModelAssembler& to, const ModelLimits& limits) 
   const json* asset = getField(gltf, "asset");
   const std::string* version = asset == nullptr ? nullptr : getString(*asset, "version");
   if (version == nullptr || !version->starts_with("2.")) to.refuse("asset", "is not glTF 2.0", "export it as glTF 2.0");
-  for (const char* kind : {"extensionsUsed", "extensionsRequired"}) {
-    const json* names = getArray(gltf, kind);
-    if (names == nullptr) continue;
-    const bool isRequired = std::string_view(kind) == "extensionsRequired";
-    for (const json& name : *names) {
-      if (name == "KHR_draco_mesh_compression") {
-        to.refuse("", "uses KHR_draco_mesh_compression, which is not read here", "export it without Draco compression");
-      }
-      if (isRequired && name.is_string() && name.get_ref<const std::string&>().ends_with("_meshopt_compression")) {
-        to.refuse("", "uses meshopt compression, which only the browser reads", "export it without compression");
-      }
+  const json* required = getArray(gltf, "extensionsRequired");
+  for (const json& name : required == nullptr ? json::array() : *required) {
+    if (name == "KHR_draco_mesh_compression") {
+      to.refuse("", "uses KHR_draco_mesh_compression, which is not read here", "export it without Draco compression");
+    }
+    if (name.is_string() && name.get_ref<const std::string&>().ends_with("_meshopt_compression")) {
+      to.refuse("", "uses meshopt compression, which only the browser reads", "export it without compression");
     }
   }
   GltfReader(gltf, binary, to, limits).read();

@@ -186,8 +186,8 @@ TEST(GltfModel, IsRefusedWithThePlaceOfTheError) {
   EXPECT_EQ(changed("/scenes/0/nodes", json({1})), "scenes[0].nodes: name no node");
   EXPECT_EQ(changed("/meshes/0/primitives/0/indices", 7), "accessors[7]: has no count");
   EXPECT_EQ(changed("/meshes/0/primitives/0/material", 0), "meshes[0].primitives[0].material: is missing");
-  EXPECT_EQ(changed("/meshes/0/primitives/0/attributes", json::object()), "meshes[0].primitives[0]: has no positions");
-  EXPECT_EQ(changed("/extensionsUsed", json({"KHR_draco_mesh_compression"})),
+  EXPECT_EQ(changed("/meshes/0/primitives/0/attributes", json::object()), ": holds nothing to draw");
+  EXPECT_EQ(changed("/extensionsRequired", json({"KHR_draco_mesh_compression"})),
             ": uses KHR_draco_mesh_compression, which is not read here");
   EXPECT_NE(refusal(json(5)).find("is not glTF 2.0"), std::string::npos);
 }
@@ -218,6 +218,18 @@ TEST(GltfModel, TakesLittleTimeAndMemoryWhateverAFileClaims) {
   limits.triangles = 400'000;
   for (size_t i = 0; i < 200; ++i) file["meshes"][0]["primitives"].push_back(file["meshes"][0]["primitives"][0]);
   EXPECT_NE(refusal(file, limits).find("has more than 400000 triangles"), std::string::npos);
+  // Many nodes whose mesh has many primitives without triangles.
+  file = triangleFile();
+  file["nodes"] = json(json::array_t(20'000, json{{"mesh", 0}}));
+  file["scenes"] = json::array();
+  file["meshes"][0]["primitives"] = json(json::array_t(20'000, json{{"mode", 0}}));
+  EXPECT_EQ(refusal(file), "accessors: are read too often");
+  // Materials that share a large image, and sparse accessors with much besides their numbers.
+  file = triangleFile();
+  file["images"] = {{{"uri", "data:image/png;base64," + std::string(4'000'000, 'A')}}};
+  file["textures"] = {{{"source", 0}}};
+  for (size_t i = 0; i < 2000; ++i) file["materials"].push_back({{"emissiveTexture", {{"index", 0}}}});
+  EXPECT_EQ(readFrom(file).lacking.size(), 1u);
   const std::string nested = std::string(1'000'000, '[');
   const auto reader = [&](const std::string&) -> std::optional<Bytes> {
     const auto bytes = std::as_bytes(std::span(nested));

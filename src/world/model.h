@@ -52,7 +52,7 @@ struct ModelLimits {
   int64_t texturePixels = int64_t{1} << 26;  // of all textures of the model
 };
 
-// Reads a model in its first pose: animations are not played. `path`: of its own file; its extension states the format.
+// Reads a model without animations, skins and morph targets. `path`: of its own file; its extension states the format.
 // Throws Error that names `path` if the file is not provided, cannot be read, exceeds a limit or holds nothing to draw.
 Model readModel(const std::string& path, const ModelFileReader& readFile, const ModelLimits& limits = {});
 

@@ -156,7 +156,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     const textures = new MeshTextures(content);
     const parts = content.parts.flatMap((part, n): DrawnMeshPart[] => {
       if (part.patches === 0) return [];
-      const coloured = this.colours.add(part, isCompressed, textures.parts[n], colourOfBlock(number), colourOfLevel(level));
+      const coloured = this.colours.add(part, isCompressed, textures.parts[n], colourOfBlock(number), colourOfLevel(level), this.anyCamera);
       const uniforms = {
         ...this.uniforms,
         opacityTexels: { value: textures.parts[n].opacity },

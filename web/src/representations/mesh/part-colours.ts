@@ -178,7 +178,10 @@ export class PartColours {
     return mesh;
   }
 
-  add(part: MeshPart, isCompressed: boolean, { features }: PartTextures, ofBlock: THREE.Color, ofLevel: THREE.Color): ColouredPart {
+  add(
+    part: MeshPart, isCompressed: boolean, { features }: PartTextures, ofBlock: THREE.Color, ofLevel: THREE.Color, camera: THREE.Camera,
+  ): ColouredPart {
+    this.prepare(part, isCompressed, camera); // again, if the last part that used it has been removed since
     const { ranges, network } = part;
     const place = this.place(network);
     const vectors = new Float32Array(4 * (kVectorsBeforeNetwork + (place === 'written' ? 0 : networkVectors(network))));
@@ -210,13 +213,14 @@ export class PartColours {
     colours.material.dispose();
     inspector.material.dispose();
     const { fragmentShader } = colours.material;
-    this.users.set(fragmentShader, this.users.get(fragmentShader)! - 1);
-    for (const [shader, { material }] of this.prepared) {
-      if (!this.drawsOnCpu || this.users.get(shader)) continue; // programs for all networks of a shape are few
-      material.dispose();
-      this.prepared.delete(shader);
-      this.users.delete(shader);
+    const users = this.users.get(fragmentShader)! - 1;
+    if (users > 0 || !this.drawsOnCpu) { // programs for all networks of a shape are few
+      this.users.set(fragmentShader, users);
+      return;
     }
+    this.prepared.get(fragmentShader)?.material.dispose();
+    this.prepared.delete(fragmentShader);
+    this.users.delete(fragmentShader);
   }
 
   dispose(): void {

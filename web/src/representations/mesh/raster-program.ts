@@ -27,7 +27,7 @@ uniform vec4 part;
 uniform float sceneNear;
 out vec2 place;  // in the textures
 out vec3 fromReference;
-flat out uvec4 numbers;  // seed of the layer in the pixel (0, 0) of the image; of the part; of the frame, from 0 to 63; bits of sceneNear
+flat out uvec4 numbers;  // x: seed of the layer in pixel (0, 0); y: the part; z: the frame, 0 to 63; w: bits of sceneNear
 #ifdef INSPECTED
 flat out uint triangle;
 #endif
