@@ -12,6 +12,7 @@
 
 #include "base/threads.h"
 #include "render/tile_frame.h"
+#include "render/tile_selection.h"
 #include "scene/view_renderer.h"
 #include "tiles/content.h"
 
@@ -43,8 +44,6 @@ struct SceneView {
   // A content that is always in memory, whatever the view; null if the scene is empty.
   const ResidentContent* pinned = nullptr;
 };
-
-inline constexpr double kUsualHysteresis = 1.2;  // see SelectionSettings
 
 struct ViewRequest {
   const Camera& camera;

@@ -134,7 +134,8 @@ struct TileSelector::Pass {
 TileSelector::TileSelector(const TileTree& tree, SelectionSettings settings)
     : tree_(tree), settings_(settings), pinned_(tree.coarsest()), replaced_(tree.tiles.size()) {
   tree.check();
-  CHECK(settings.hysteresis >= 1.0);
+  if (settings_.hysteresis == 0) settings_.hysteresis = kUsualHysteresis;
+  CHECK(settings_.hysteresis >= 1.0);
   if (tree.backgroundBlock >= 0) pinned_.push_back(tree.backgroundBlock);
 }
 

@@ -20,10 +20,13 @@
 
 namespace tessera {
 
+inline constexpr double kUsualHysteresis = 1.2;
+
 struct SelectionSettings {
   double maximumScreenSpaceError = 1.5;  // pixels of geometric error; 0: the finest tiles everywhere
-  double hysteresis = 0;                 // also the factor by which resident tiles are preferred; 0: the drawer's
-  int finestLevel = 0;                   // tiles of this level and finer are never replaced
+  // Also the factor by which resident tiles are preferred. 0: that of the drawer (selectionFor), or kUsualHysteresis.
+  double hysteresis = 0;
+  int finestLevel = 0;  // tiles of this level and finer are never replaced
 };
 
 // What a camera sees of a scene, in scene units.
