@@ -5,8 +5,8 @@
 
 namespace tessera {
 
-// `path`: of the model's own file. Adds all that it shows to `to`, in its first pose. Throws Error that names `path`.
-// Assimp does not withstand every file: it first reads the model in a copy of this process, with limits.
+// `path`: of the model's own file. Adds all that it shows to `to`, without animations and skins. Throws Error that
+// names `path`. Assimp does not withstand every file: it first reads the model in a copy of this process, with limits.
 void readByAssimp(const std::string& path, const ModelFileReader& readFile, ModelAssembler& to,
                   const ModelLimits& limits);
 
