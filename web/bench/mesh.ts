@@ -20,8 +20,8 @@ const out = needed('OUT'); // for images
 const kFrames = 7; // of which the fastest counts
 
 function enlarged(view: View, times: number): View {
-  const { matrix, ...lens } = view;
-  return { matrix, ...(Object.fromEntries(Object.entries(lens).map(([name, value]) => [name, times * value])) as Omit<View, 'matrix'>) };
+  const { fx, fy, cx, cy, width, height } = view;
+  return { ...view, fx: times * fx, fy: times * fy, cx: times * cx, cy: times * cy, width: times * width, height: times * height };
 }
 
 function median(values: number[]): number {

@@ -22,6 +22,7 @@ export interface View {
   cy: number;
   width: number;
   height: number;
+  isParallel?: boolean; // a parallel projection: fx and fy are pixels per unit of the world
 }
 
 // Lays out several views beside one another.
@@ -43,12 +44,17 @@ function look(views: View | View[]): THREE.Camera {
   return several;
 }
 
-function setCamera(camera: THREE.PerspectiveCamera, { matrix, fx, fy, cx, cy, width, height }: View): void {
+function setCamera(camera: THREE.PerspectiveCamera, { matrix, fx, fy, cx, cy, width, height, isParallel }: View): void {
   camera.matrixAutoUpdate = false;
   camera.matrix.fromArray(matrix).premultiply(kYUpFromZUp);
   const near = 0.1;
-  camera.projectionMatrix.makePerspective(
-    (-cx * near) / fx, ((width - cx) * near) / fx, (cy * near) / fy, (-(height - cy) * near) / fy, near, 1e4);
+  const sides = [-cx / fx, (width - cx) / fx, cy / fy, -(height - cy) / fy] as const;
+  if (isParallel) {
+    camera.projectionMatrix.makeOrthographic(...sides, near, 1e4);
+  } else {
+    const [left, right, top, bottom] = sides.map((side) => side * near);
+    camera.projectionMatrix.makePerspective(left, right, top, bottom, near, 1e4);
+  }
   camera.projectionMatrixInverse.copy(camera.projectionMatrix).invert();
   camera.updateMatrixWorld(true);
 }

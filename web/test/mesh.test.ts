@@ -213,6 +213,37 @@ describe.skipIf(missing())('a scene of mesh', () => {
     behind.forEach((value, c) => expect(Math.abs(value - without[pixel + c])).toBeLessThan(9));
   });
 
+  it('hides what is behind a model, and a model that is behind it, in parallel projections, too', async () => {
+    const { scale } = tileset.worldFromScene;
+    const parallel: View = { ...above, isParallel: true, fx: above.fx / (2 * scale), fy: above.fy / (2 * scale) };
+    for (const one of [above, parallel]) {
+      const without = await picture(one);
+      await page.evaluate(() => headlessPage.addBox([-0.3, -1.3, 0.3], [0.4, -1.1, 0.8]));
+      await page.evaluate(() => (headlessPage.city!.visible = false));
+      const alone = await picture(one);
+      await page.evaluate(() => (headlessPage.city!.visible = true));
+      const inFront = await picture(one);
+      await page.evaluate(() => headlessPage.removeBox());
+      await page.evaluate(() => headlessPage.addBox([0, 0.4, -1.1], [0.3, 0.6, -0.9])); // below the ground
+      const behind = await picture(one);
+      await page.evaluate(() => headlessPage.removeBox());
+      const isRed = (pixels: Uint8Array, at: number) => pixels[at] > 235 && pixels[at + 1] < 20;
+      const counts = { covered: 0, red: 0, same: 0, changed: 0 };
+      for (let at = 0; at < alone.length; at += 3) {
+        const difference = (other: Uint8Array) => Math.max(...[0, 1, 2].map((c) => Math.abs(other[at + c] - without[at + c])));
+        if (isRed(alone, at)) ++counts.covered;
+        if (isRed(alone, at) && isRed(inFront, at)) ++counts.red;
+        if (!isRed(alone, at) && difference(inFront) < 9) ++counts.same;
+        if (difference(behind) > 40) ++counts.changed;
+      }
+      const pixels = alone.length / 3;
+      expect(counts.covered).toBeGreaterThan(pixels / 10);
+      expect(counts.red).toBeGreaterThan(0.99 * counts.covered);
+      expect(counts.same).toBeGreaterThan(0.97 * (pixels - counts.covered)); // but for soft edges
+      expect(counts.changed).toBeLessThan(0.01 * pixels);
+    }
+  });
+
   it('draws solid surfaces in motion only for what they may hide, and for picking', async () => {
     let nudge = 0;
     const countTriangles = async () => page.evaluate((one) => {

@@ -16,7 +16,7 @@ import { kMeshModes } from './mesh-modes';
 import { MeshTargets } from './mesh-targets';
 import { MeshTextures } from './mesh-textures';
 import { kSortShader, kWholeScreen, PartColours, rectangleMaterial, type ColouredPart } from './part-colours';
-import { blendMaterial, kCopyShader, kSkyShader, passMaterial } from './passes';
+import { blendMaterial, kCopyShader, kSkyShader, objectsMaterial, passMaterial } from './passes';
 import { joinRuns, makeChunks, screenRectangle, selectChunks, visibleHalfSpaces, type PatchChunk, type ScreenRectangle } from './patch-chunks';
 import { bytesOfIndices, drawRange, patchGeometry } from './patch-geometry';
 import { distanceToBox, distanceToSides, jittered, frameJitter, rasterProjection, referencePoint, relativeOrigin, relativeTo, matrixRow } from './picture-place';
@@ -70,7 +70,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   private readonly triangles = new THREE.Scene();
   private readonly pass = new THREE.Scene();
   private readonly uniforms: Uniforms; // of triangles and passes
-  private readonly passes: Record<'sort' | 'sky' | 'blend' | 'copy', TriangleMesh>;
+  private readonly passes: Record<'objects' | 'sort' | 'sky' | 'blend' | 'copy', TriangleMesh>;
   private readonly colours: PartColours;
   private readonly prepared = new Map<string, TriangleMesh>(); // keeps programs alive
   private lastId = 0;
@@ -101,6 +101,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.colours = new PartColours(renderer, this.uniforms);
     const ofNoPart = { ...this.uniforms, partNumber: { value: 0 }, rectangle: { value: new THREE.Vector4(...kWholeScreen) } };
     this.passes = {
+      objects: this.makePass(objectsMaterial(this.uniforms)),
       sort: this.makePass(passMaterial(kSortShader, this.uniforms)), sky: this.colours.makeMesh(rectangleMaterial(kSkyShader, ofNoPart)),
       blend: this.makePass(blendMaterial(this.uniforms)), copy: this.makePass(passMaterial(kCopyShader, this.uniforms)),
     };
@@ -211,7 +212,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     const hidden = selectHiddenBoxes(settings.hidden, settings.hiddenOfBackgroundBlock);
     this.view.opaqueDepth.value = opaqueDepth ?? this.nothingOpaque;
     this.view.display.value = kMeshModes.findIndex(({ name }) => name === settings.display);
-    this.isGeneral = opaqueDepth !== null || settings.visibility < kFarAway || settings.withinBox;
+    this.isGeneral = settings.visibility < kFarAway || settings.withinBox;
     this.uniforms.visibility.value = settings.visibility;
     this.uniforms.withinBox.value = settings.withinBox;
     // The frames at rest are a sequence of their own, so that images depend on the view alone.
@@ -295,7 +296,7 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
     this.renderer.setRenderTarget(decoded);
     if (number === 0) this.renderer.clear();
     if (!rectangles) {
-      for (const isBackground of [true, false]) this.renderTriangles(picture, frontToBack, 'layers', isBackground, point);
+      for (const isBackground of [true, false]) this.renderTriangles(picture, frontToBack, 'layers', isBackground, decoded, point);
     } else {
       const sky = frontToBack.map(({ content }) => content.textures.sky).find((one) => one !== undefined);
       const passes = [...rectangles].map(([{ colours, inspector }, rectangle]) => {
@@ -354,15 +355,12 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
   ): Map<ColouredPart, ScreenRectangle> {
     target.viewport.copy(picture.part);
     if (picture === this.pictures[0]) this.targets.clear(this.renderer, target);
-    this.renderer.setRenderTarget(target);
-    this.renderer.clear(false, true, false);
-    const behind = this.renderTriangles(picture, frontToBack, kind, true, point);
-    this.renderer.clear(false, true, false);
-    return new Map([...behind, ...this.renderTriangles(picture, frontToBack, kind, false, point)]);
+    const behind = this.renderTriangles(picture, frontToBack, kind, true, target, point);
+    return new Map([...behind, ...this.renderTriangles(picture, frontToBack, kind, false, target, point)]);
   }
 
   private renderTriangles(
-    picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, isBackground: boolean, point: THREE.Vector3,
+    picture: Picture, frontToBack: DrawnPart<DrawnMesh>[], kind: RasterKind, isBackground: boolean, target: THREE.WebGLRenderTarget, point: THREE.Vector3,
   ): Map<ColouredPart, ScreenRectangle> {
     const rectangles = new Map<ColouredPart, ScreenRectangle>();
     const meshes: TriangleMesh[] = [];
@@ -405,6 +403,12 @@ export class MeshDrawer implements SceneDrawer<MeshHeader, MeshContent, DrawnMes
       }
     }
     if (meshes.length === 0) return rectangles;
+    if (this.view.opaqueDepth.value === this.nothingOpaque) {
+      this.renderer.setRenderTarget(target);
+      this.renderer.clear(false, true, false);
+    } else {
+      this.run([this.passes.objects], target, [picture]);
+    }
     this.triangles.children = meshes;
     this.renderer.render(this.triangles, picture.camera);
     this.triangles.children = [];

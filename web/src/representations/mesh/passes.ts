@@ -1,5 +1,5 @@
-// The passes over a picture after its triangles are drawn, apart from those of part-colours.ts: the sky, and the blending
-// with the frames before.
+// The passes over a picture, apart from those of part-colours.ts: the depths of other objects before triangles are drawn;
+// then the sky, and the blending with the frames before.
 import * as THREE from 'three';
 import { kScreenVertexShader } from '../../draw/screen-triangle';
 
@@ -46,6 +46,38 @@ export function passMaterial(
     glslVersion: THREE.GLSL3, vertexShader, fragmentShader, uniforms,
     depthTest: false, depthWrite: false, blending: THREE.NoBlending, toneMapped: false,
   });
+}
+
+// Fills the depth buffer with the depths of other objects, for the projection that triangles are drawn with: a pixel of
+// `opaqueDepth`, at depth z and thus at distance t along its ray, is at another depth there. So the driver skips triangles
+// behind objects before it runs their program.
+const kObjectsVertexShader = `
+${kRayOfVertexSource}
+in vec3 position;
+uniform mat4 clipFromReference;  // of the triangles; its last row is that of the camera's projection
+uniform vec4 depthRow, wRow;  // of the camera's projection
+out vec3 start, slope;  // of a ray: both depths before the division, and what divides them
+void main() {
+  vec3 ndc = ndcOfVertex(position.xy);
+  vec4 o = vec4(origin * ndc, 1.0), d = vec4(ray * ndc, 0.0);
+  start = vec3(dot(depthRow, o), (clipFromReference * o).z, dot(wRow, o));
+  slope = vec3(dot(depthRow, d), (clipFromReference * d).z, dot(wRow, d));
+  gl_Position = vec4(position.xy, 0.0, 1.0);
+}`;
+
+const kObjectsShader = `${kPassHead}
+in vec3 start, slope;
+uniform sampler2D opaqueDepth;
+void main() {
+  float opaque = texelFetch(opaqueDepth, min(ivec2(gl_FragCoord.xy), textureSize(opaqueDepth, 0) - 1), 0).r;
+  float z = 2.0 * opaque - 1.0, t = (z * start.z - start.x) / (slope.x - z * slope.z);
+  vec3 place = start + t * slope;
+  gl_FragDepth = opaque < 1.0 ? clamp(0.5 + 0.5 * place.y / place.z, 0.0, 1.0) : 1.0;
+}`;
+
+export function objectsMaterial(uniforms: Record<string, THREE.IUniform>): THREE.RawShaderMaterial {
+  const material = passMaterial(kObjectsShader, uniforms, kObjectsVertexShader);
+  return Object.assign(material, { depthTest: true, depthWrite: true, depthFunc: THREE.AlwaysDepth, colorWrite: false });
 }
 
 // Colours the pixels that show the sky: those that show no part.

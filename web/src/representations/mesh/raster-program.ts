@@ -50,7 +50,8 @@ void main() {
 }`;
 
 // Drivers for the CPU evaluate all branches and read uniforms slowly, so what is seldom needed is in a program of its own
-// (GENERAL): other objects, hidden boxes, limits of a content, fading, parallel projections.
+// (GENERAL): hidden boxes, limits of a content, fading, parallel projections. Other objects are in the depth buffer before
+// triangles are drawn (passes.ts).
 const kFragmentShader = `
 precision highp float;
 precision highp int;
@@ -86,10 +87,8 @@ float behindBox(vec3 o, vec3 d) {
 #ifdef GENERAL
 uniform vec4 part;
 uniform uint frame;
-uniform sampler2D opaqueDepth;
 uniform vec2 jitter;  // of the places that pixels show, in pixels
 uniform mat3 origin, ray;
-uniform vec4 depthRow, wRow;  // of the camera's projection
 uniform float visibility;
 uniform vec3 withinLow, withinHigh;
 uniform bool withinBox;
@@ -131,9 +130,6 @@ void main() {
   float opacity = textureLod(opacityTexels, vec3(place, 0.0), 0.0).r;
 #ifdef GENERAL
   if (any(lessThan(fromReference, withinLow)) || any(greaterThanEqual(fromReference, withinHigh))) discard;
-  float depth = dot(depthRow, vec4(fromReference, 1.0)) / dot(wRow, vec4(fromReference, 1.0));
-  float opaque = texelFetch(opaqueDepth, min(ivec2(gl_FragCoord.xy), textureSize(opaqueDepth, 0) - 1), 0).r;
-  if (opaque < 1.0 && 0.5 + 0.5 * depth > opaque) discard;
   if (hiddenBoxes > 0 && isHidden(fromReference)) discard;
   float outside = length(max(max(sceneLow - fromReference, fromReference - sceneHigh), 0.0));
   if (withinBox && outside > 0.0) discard;
@@ -203,7 +199,7 @@ export function rasterMaterial({ kind, isBackground, isGeneral }: RasterForm): T
     side: THREE.DoubleSide,
     blending: kind === 'layers' ? THREE.CustomBlending : THREE.NoBlending,
     blendSrc: THREE.OneFactor, blendDst: THREE.OneFactor,
-    depthTest: kind !== 'layers', depthWrite: kind !== 'layers', depthFunc: THREE.LessDepth, // of equal hits, the first counts
+    depthTest: true, depthWrite: kind !== 'layers', depthFunc: THREE.LessDepth, // of equal hits, the first counts
     toneMapped: false,
   });
 }
