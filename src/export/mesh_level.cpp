@@ -73,17 +73,11 @@ void MeshLevel::listContents() {
       contents_.push_back({number, i, fmt::format("tile_{}_{}", content.cells.first[0], content.cells.first[1])});
     }
   }
-  // Of the levels of the background block, the finest that is not finer than this one, or else the coarsest.
+  // The finest background block: coarser ones that tessera writes have as many triangles, and no ordinary mesh.
   const std::vector<TileContent>& ofRoot = tileset_.root().contents;
   std::optional<size_t> chosen;
   for (size_t i = 0; i < ofRoot.size(); ++i) {
-    if (!ofRoot[i].backgroundBlock) continue;
-    if (!chosen) {
-      chosen = i;
-      continue;
-    }
-    const uint32_t before = ofRoot[*chosen].level, now = ofRoot[i].level;
-    if (before < level_ ? now > before : now >= level_ && now < before) chosen = i;
+    if (ofRoot[i].backgroundBlock && (!chosen || ofRoot[i].level < ofRoot[*chosen].level)) chosen = i;
   }
   if (chosen) contents_.push_back({0, *chosen, "background_block"});
 }

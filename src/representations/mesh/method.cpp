@@ -55,7 +55,7 @@ std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const B
   settings.tilesPerBlock = value(kTilesPerBlock);
   settings.fallback = value(kFallback) != 0;
   settings.inferredMaps = value(kMaps) == 1;
-  if (settings.patchEdge > 0 && settings.patchEdge < PatchSet::kMinPatchEdge) {
+  if (settings.patchEdge > 0 && settings.patchEdge < kMinBakedPatchEdge) {
     throw Error("--texels " + std::to_string(settings.patchEdge), "", "is less than a patch has", "use 8 or more");
   }
   if (settings.tilesPerBlock > 0 && !std::has_single_bit(settings.tilesPerBlock)) {

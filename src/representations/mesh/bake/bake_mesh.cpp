@@ -17,7 +17,6 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kPlacesAtATime = 1 << 16;
-constexpr uint32_t kMaxPlacesPerEdge = 4;  // of a texel
 
 // The decoder's weights without padding.
 std::vector<DenseLayer> readDecoder(MeshModel& model) {
@@ -65,7 +64,7 @@ class TexelField {
         list_(list),
         patches_(patches),
         settings_(settings),
-        placesPerEdge_(placesPerEdge(level)) {
+        placesPerEdge_(settings.placesPerEdge > 0 ? settings.placesPerEdge : placesPerEdge(level)) {
     Device& device = model.device();
     if (const CoarseAtlas* const fitted = model.coarseAtlas(level)) {
       placesPerEdge_ = 1;

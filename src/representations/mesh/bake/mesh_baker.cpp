@@ -24,6 +24,7 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kCellsPerTile = 32;
+constexpr uint32_t kCoarseBackgroundPatchEdge = 4;
 constexpr const char* kPng = "image/png";
 constexpr int kExhaustiveFromEffort = 7;
 
@@ -85,12 +86,12 @@ class MeshBaker final : public Baker {
     frame_.georeference = given.geo;
     uint32_t levels = 1;
     for (const StoredMesh::Part& each : mesh_.parts()) levels = std::max(levels, each.levels);
+    backgroundLevels_ = std::min(levels, 2u);
     int64_t passes = 0, extractions = 0;
     for (const StoredMesh::Part& each : mesh_.parts()) {
-      for (uint32_t level = 0; level < (each.part.isBackground() ? 1 : levels); ++level) {
-        ++passes;
+      passes += each.part.isBackground() ? backgroundLevels_ : levels;
+      for (uint32_t level = 0; level < (each.part.isBackground() ? 1 : levels); ++level)
         extractions += isExtracted(each, level) ? 1 : 0;
-      }
     }
     Capture capture = applyTransientMasks(given, mesh_.folder());
     if (extractions > 0)  // triangles are what the photos of the training show
@@ -177,7 +178,18 @@ class MeshBaker final : public Baker {
   void bakeBackground(const Capture& capture, const StoredMesh::Part& outside) {
     const std::unique_ptr<MeshModel> loaded = mesh_.load(outside.part, MeshUse::baking);
     MeshModel& model = *loaded;
-    const BakedPatches baked = bakePart(capture, model, 0);
+    const FaceSet faces = listFaces(capture, model, 0);
+    for (uint32_t level = 0; level < backgroundLevels_; ++level) bakeBackground(model, faces, level);
+  }
+
+  // The coarse level has the same triangles, with few texels and without an ordinary mesh: other programs than ours
+  // show all contents of the root at once.
+  void bakeBackground(MeshModel& model, const FaceSet& faces, uint32_t level) {
+    MeshBakeSettings settings;
+    settings.patchEdge = level == 0 ? settings_.patchEdge : kCoarseBackgroundPatchEdge;
+    settings.placesPerEdge = level == 0 ? 0 : kMaxPlacesPerEdge;
+    settings.baseColours = settings_.fallback && level == 0;
+    const BakedPatches baked = bakePatches(model, 0, faces, settings);
     reportStep();
     GrowingContent growing;
     growing.content.isBackground = true;
@@ -192,7 +204,7 @@ class MeshBaker final : public Baker {
       byDistance[static_cast<int>(std::floor(std::log2(std::max(1.0, x.cwiseAbs().maxCoeff()))))].push_back(patch);
     }
     for (const auto& [octave, patches] : byDistance) addPatches(baked, patches, model, nullptr, growing);
-    finish(0, std::nullopt, growing);
+    finish(level, std::nullopt, growing);
   }
 
   void reportStep() { options_.onStep(++stepsDone_, steps_); }
@@ -223,23 +235,22 @@ class MeshBaker final : public Baker {
     settings.patchEdge = settings_.patchEdge;
     settings.baseColours = settings_.fallback;
     // Else MapInference makes them.
-    settings.texels = settings_.fallback || model.part().isBackground() || isFitted(model, sceneLevel);
-    if (isFitted(model, sceneLevel)) {
-      settings.patchEdge = model.atlas()->patchEdge;
-      return bakePatches(model, level, model.coarseAtlas(level)->faces, settings);
-    }
-    if (!isExtracted(model, sceneLevel)) {
-      return bakePatches(model, 0, model.atlas()->faces, settings);
-    }
+    settings.texels = settings_.fallback || isFitted(model, sceneLevel);
+    if (isFitted(model, sceneLevel)) settings.patchEdge = model.atlas()->patchEdge;
+    return bakePatches(model, level, listFaces(capture, model, sceneLevel), settings);
+  }
+
+  FaceSet listFaces(const Capture& capture, MeshModel& model, uint32_t sceneLevel) {
+    const uint32_t level = findModelLevel(model, sceneLevel);
+    if (isFitted(model, sceneLevel)) return model.coarseAtlas(level)->faces;
+    if (!isExtracted(model, sceneLevel)) return model.atlas()->faces;
     ExtractionSettings extraction;
     extraction.photoStride = options_.stride << level;
     // Triangles of coarse levels are few, and holes in them are large.
     if (level == 0) extraction.droppedShare = model.config().droppedShare;
     extraction.dilation = model.config().dilation;
     if (model.part().isBackground()) extraction.raysPerCell = 0;
-    const FaceSet faces =
-        extractFaces(model, level, capture, nullptr, extraction, [this](int64_t, int64_t) { reportStep(); });
-    return bakePatches(model, level, faces, settings);
+    return extractFaces(model, level, capture, nullptr, extraction, [this](int64_t, int64_t) { reportStep(); });
   }
 
   SceneFromPart sceneFromPart(const MeshModel& model) const {
@@ -321,7 +332,7 @@ class MeshBaker final : public Baker {
                                                              : compressPatches(baked, some, placement, effort));
       if (encoder) setMaps(*encoder, effort, to);
       to.include(part);
-      if (settings_.fallback) to.textures.push_back(makeBaseColourTexture(baked, some, part));
+      if (!baked.baseColours.empty()) to.textures.push_back(makeBaseColourTexture(baked, some, part));
     }
   }
 
@@ -397,8 +408,9 @@ class MeshBaker final : public Baker {
     const double region = std::max({2.0 * grid_.columns, 2.0 * grid_.rows, frame_.top - frame_.bottom});
     const double cell = isBackground ? region / config.backgroundCells
                                      : 2.0 * tilesPerBlock_ / (1 - 2 * kBlockMargin) / (config.meshCells >> level);
-    const bool isOfTraining = !isBackground && level > 0 && config.fitsLevels();
-    const uint32_t patchEdge = isOfTraining ? static_cast<uint32_t>(config.patchTexels) : settings_.patchEdge;
+    uint32_t patchEdge = settings_.patchEdge;
+    if (level > 0 && isBackground) patchEdge = kCoarseBackgroundPatchEdge;
+    if (level > 0 && !isBackground && config.fitsLevels()) patchEdge = static_cast<uint32_t>(config.patchTexels);
     return std::numbers::sqrt2 * cell / (patchEdge - 1);
   }
 
@@ -410,6 +422,7 @@ class MeshBaker final : public Baker {
   BakeOptions options_;
   ContentSink* sink_ = nullptr;
   std::vector<GrowingLevel> growing_;
+  uint32_t backgroundLevels_ = 1;
   int64_t steps_ = 0, stepsDone_ = 0;  // BakeOptions::onStep
 };
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -25,7 +26,7 @@
 namespace tessera {
 namespace {
 
-// A cube in front of walls, trained for a moment in 2 × 1 blocks with background, once for all tests.
+// A cube in front of walls, trained for a moment in 2 × 1 blocks that contain the walls, once for all tests.
 class BakeMeshScene : public testing::Test {
  protected:
   static void SetUpTestSuite() {
@@ -153,6 +154,52 @@ TEST_F(BakeMeshScene, ContainsOrdinaryMeshesWithTexturesThatExist) {
   EXPECT_EQ(textures.size(), baked.tileset.resources.size());
   bake("without", {.fallback = false});
   EXPECT_FALSE(fs::exists(*cube_ / "without" / "resources"));
+}
+
+TEST_F(BakeMeshScene, HasACoarseBackgroundBlockWithTheSameTriangles) {
+  const CubeScene scene;     // without walls, so that photos show what is outside of the region
+  TrainMeshOptions options;  // the walls are outside of the block
+  options.config = smallMeshConfig();
+  options.config.coarseSteps = 400;
+  options.config.backgroundShare = 0.9;
+  options.grid = cubeGrid();
+  options.loop.steps = 300;
+  options.loop.progress = false;
+  options.loop.checkpointSeconds = 1e6;
+  ASSERT_TRUE(trainMesh(*device_, cube_->capture(), *cube_ / "cube_alone", options).finished);
+  const auto baker = makeMeshBaker(StoredMesh(*device_, *cube_ / "cube_alone"), {.patchEdge = 12});
+  const BakedScene baked = bakeScene(*baker, cube_->capture(), *cube_ / "background", {});
+  std::map<uint32_t, std::unique_ptr<Content>> contents;  // of background blocks, by level
+  std::map<uint32_t, TileContent> listed;
+  for (const TileContent& each : baked.tileset.root().contents) {
+    if (!each.backgroundBlock) continue;
+    listed[each.level] = each;
+    contents[each.level] = readContent(contentPath(*cube_ / "background", each.uri), meshCodec());
+  }
+  ASSERT_EQ(contents.size(), 2u);
+  EXPECT_GT(listed[1].geometricError, listed[0].geometricError);
+  const MeshContent &fine = contentAs<MeshContent>(*contents[0]), &coarse = contentAs<MeshContent>(*contents[1]);
+  EXPECT_GT(fine.triangles(), 20u);
+  EXPECT_LT(contents[1]->memoryBytes() - fine.sky.size(), (contents[0]->memoryBytes() - fine.sky.size()) / 2);
+  EXPECT_EQ(coarse.sky, fine.sky);
+  ASSERT_EQ(coarse.parts.size(), fine.parts.size());
+  double same = 0, other = 0;  // differences of numbers in the middle of equal patches, and of patches that follow
+  for (size_t i = 0; i < fine.parts.size(); ++i) {
+    const PatchSet &a = fine.parts[i], &b = coarse.parts[i];
+    EXPECT_EQ(b.patchEdge, 4u);
+    ASSERT_EQ(b.vertices, a.vertices);
+    for (uint32_t patch = 0; patch + 1 < a.pairs; ++patch) {
+      const MeshTexel one = mixTexels(a, patch, 5.5, 5.5), two = mixTexels(b, patch, 1.5, 1.5),
+                      next = mixTexels(b, patch + 1, 1.5, 1.5);
+      for (size_t f = 0; f < kMeshFeatures; ++f) {
+        same += std::abs(one.features[f] - two.features[f]);
+        other += std::abs(one.features[f] - next.features[f]);
+      }
+    }
+  }
+  EXPECT_LT(same, other / 2);
+  const Bytes file = readFile(contentPath(*cube_ / "background", listed[1].uri));
+  EXPECT_FALSE(nlohmann::json::parse(decodeGlb(file)->json).contains("meshes")) << "other programs show both";
 }
 
 TEST_F(BakeMeshScene, InfersTheTexturesThatItWouldStore) {

@@ -3,6 +3,7 @@
 // defines what all of it means.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <memory>
@@ -55,7 +56,7 @@ struct PatchEncoder {
 // texels. Its corners lie at the centres of its outermost texels (0, 0), (T-1, 0), (0, T-1) and (T-1, T-1), as (column,
 // row). Its triangles have the corners (0, 1, 2) and (3, 2, 1); patches from `pairs` on have the first alone.
 struct PatchSet {
-  static constexpr uint32_t kMinPatchEdge = 8, kMaxPatchEdge = 32;
+  static constexpr uint32_t kMinPatchEdge = 4, kMaxPatchEdge = 32;
   static constexpr uint32_t kMaxTextureEdge = 4096;         // texels, which every GPU supports
   static constexpr uint32_t kFeatureTextures = 4;           // of two features each
   static constexpr uint32_t kBc4Bytes = 8, kBc5Bytes = 16;  // of a block of 4×4 texels
@@ -83,9 +84,11 @@ struct PatchSet {
   Vec3d corner(uint32_t patch, uint32_t number) const;
 };
 
-// Returns the largest number of patches that fit a texture.
+// Returns the largest number of patches of a part: those that fit a texture, and at most 2^18, so that single precision
+// suffices for their numbers.
 constexpr uint32_t maxPatches(uint32_t patchEdge) {
-  return (PatchSet::kMaxTextureEdge / patchEdge) * (PatchSet::kMaxTextureEdge / patchEdge);
+  const uint32_t across = PatchSet::kMaxTextureEdge / std::max(patchEdge, 8u);
+  return across * across;
 }
 
 // Mixes the texels of a patch at a column and a row in [0, T-1].

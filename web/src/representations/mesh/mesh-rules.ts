@@ -5,7 +5,7 @@ import { ruleOfNetwork } from '../../tiles/network';
 import type { Broken } from '../../tiles/tileset-rules';
 import { kCornerNumbers, kFeatures, type MeshPart } from './mesh-content';
 
-export const kMinPatchEdge = 8;
+export const kMinPatchEdge = 4;
 export const kMaxPatchEdge = 32;
 export const kMaxTextureEdge = 4096;
 export const kMaxSkyEdge = 1024;
@@ -16,8 +16,9 @@ const kLargestStep = 152;
 const kLargestFeature = 1e6;
 const kBoxTolerance = 1e-6; // of the larger of 1 and the box's coordinate
 
+// At most 2^18, so that single precision suffices for the numbers of patches.
 export function maxPatches(patchEdge: number): number {
-  return Math.floor(kMaxTextureEdge / patchEdge) ** 2;
+  return Math.floor(kMaxTextureEdge / Math.max(patchEdge, 8)) ** 2;
 }
 
 export function ruleOfPart({ origin, step, ranges, network }: MeshPart): Broken {
