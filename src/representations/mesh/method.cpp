@@ -56,7 +56,7 @@ std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const B
   settings.fallback = value(kFallback) != 0;
   settings.inferredMaps = value(kMaps) == 1;
   if (settings.patchEdge > 0 && settings.patchEdge < kMinBakedPatchEdge) {
-    throw Error("--texels " + std::to_string(settings.patchEdge), "", "is less than a patch has", "use 8 or more");
+    throw Error("--texels " + std::to_string(settings.patchEdge), "", "is less than baked patches have", "use 8 or more");
   }
   if (settings.tilesPerBlock > 0 && !std::has_single_bit(settings.tilesPerBlock)) {
     throw Error("--tiles-per-block " + std::to_string(settings.tilesPerBlock), "", "is not a power of two",
