@@ -18,6 +18,9 @@ void parsePair(const std::string& text, const char* flag, int* first, int* secon
 
 struct SynthFlags {
   std::string out, blocks = "2x2", size = "400x300";
+  double overlap = 0;
+  std::vector<double> gpsNoise;
+  bool noExif = false;
   CityOptions city;
 };
 
@@ -31,8 +34,14 @@ void addSynthVerb(CLI::App& app) {
   auto flags = std::make_shared<SynthFlags>();
   verb->add_option("out", flags->out, "capture folder to write")->required();
   verb->add_option("--blocks", flags->blocks, "city blocks, east x north")->capture_default_str();
-  verb->add_option("--photos", flags->city.photos, "number of photos; 0: enough for the size of the city")
-      ->capture_default_str();
+  CLI::Option* photos =
+      verb->add_option("--photos", flags->city.photos, "number of photos; 0: enough for the size of the city")
+          ->capture_default_str();
+  verb->add_option("--overlap", flags->overlap,
+                   "surveys whose photos overlap by this percentage along and across the lines: a nadir survey at each "
+                   "altitude, four oblique ones at the highest; the number of photos follows")
+      ->check(CLI::Range(1, 95))
+      ->excludes(photos);
   verb->add_option("--size", flags->size, "photo size in pixels")->capture_default_str();
   verb->add_option("--seed", flags->city.seed, "seed; each value gives another city")->capture_default_str();
   verb->add_option("--altitudes", flags->city.altitudes, "altitudes of the flights, metres above ground")
@@ -41,6 +50,13 @@ void addSynthVerb(CLI::App& app) {
   verb->add_flag("--traffic", flags->city.traffic, "cars that move between photos, with masks");
   verb->add_option("--exposure-jitter", flags->city.exposureJitter, "spread of the photos' exposure, in stops")
       ->capture_default_str();
+  verb->add_option("--gps-noise", flags->gpsNoise, "standard deviations of GPS in metres: each horizontal axis, height")
+      ->delimiter(',')
+      ->expected(2);
+  verb->add_option("--height-offsets", flags->city.heightOffsets,
+                   "metres by which the GPS heights of the first, second, ... flight are too high")
+      ->delimiter(',');
+  verb->add_flag("--no-exif", flags->noExif, "photos without EXIF and XMP");
   verb->add_option("--samples", flags->city.samplesPerPixel, "rays per pixel")->capture_default_str();
   verb->add_flag("--pinhole", flags->city.pinhole, "an ideal lens instead of a mildly distorted one");
   verb->add_option("--threads", flags->city.threads, "CPU threads; 0: all cores")
@@ -49,6 +65,12 @@ void addSynthVerb(CLI::App& app) {
   verb->callback([flags] {
     parsePair(flags->blocks, "--blocks", &flags->city.blocksX, &flags->city.blocksY);
     parsePair(flags->size, "--size", &flags->city.width, &flags->city.height);
+    flags->city.overlap = flags->overlap / 100;
+    if (!flags->gpsNoise.empty()) {
+      flags->city.gpsNoise = flags->gpsNoise[0];
+      flags->city.gpsHeightNoise = flags->gpsNoise[1];
+    }
+    flags->city.exif = !flags->noExif;
     const Capture capture = synthesiseCity(flags->out, flags->city);
     fmt::print("{}: {} photos, {} sparse points\n", flags->out, capture.photos.size(), capture.points.size());
   });

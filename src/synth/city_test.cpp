@@ -109,6 +109,46 @@ TEST_F(City, AgreesOnPlacesInExifAndInPoses) {
   }
 }
 
+TEST_F(City, PutsErrorsOfGpsIntoFixesAndNotIntoPoses) {
+  CityOptions options = tiny();
+  options.photos = 60;
+  options.width = 12;
+  options.height = 9;
+  options.gpsNoise = 2;
+  options.gpsHeightNoise = 0.5;
+  options.heightOffsets = {15};
+  const Capture capture = synthesiseCity(folder_, options);
+  const GeographicLib::LocalCartesian earth(capture.geo->latitude, capture.geo->longitude, capture.geo->altitude);
+  Vec3d squares = Vec3d::Zero();
+  int tooHigh = 0;
+  for (const Photo& photo : capture.photos) {
+    Vec3d error;
+    earth.Forward(photo.gps->latitude, photo.gps->longitude, photo.gps->altitude, error.x(), error.y(), error.z());
+    error -= photo.worldFromCamera.translation;
+    if (error.z() > 10) {
+      ++tooHigh;
+      error.z() -= 15;
+    }
+    squares += error.cwiseAbs2();
+  }
+  const Vec3d deviation = (squares / 60).cwiseSqrt();
+  EXPECT_EQ(tooHigh, 9) << "the first of twelve flights";
+  EXPECT_NEAR(deviation.x(), 2, 0.5);
+  EXPECT_NEAR(deviation.y(), 2, 0.5);
+  EXPECT_NEAR(deviation.z(), 0.5, 0.15);
+}
+
+TEST_F(City, WritesPhotosWithoutTagsIfAskedTo) {
+  CityOptions options = tiny();
+  options.photos = 1;
+  options.exif = false;
+  const Capture capture = synthesiseCity(folder_, options);
+  EXPECT_FALSE(capture.photos[0].gps);
+  const std::string photo = readTextFile(capture.photos[0].image);
+  EXPECT_EQ(photo.find("Exif"), photo.npos);
+  EXPECT_EQ(photo.find("xmpmeta"), photo.npos);
+}
+
 TEST_F(City, ChangesWithTheSeed) {
   CityOptions options = tiny();
   options.photos = 2;
@@ -130,7 +170,9 @@ TEST_F(City, RejectsOptionsThatCannotBeBuilt) {
   for (auto spoil : {+[](CityOptions& o) { o.blocksX = 0; }, +[](CityOptions& o) { o.width = 0; },
                      +[](CityOptions& o) { o.altitudes.clear(); }, +[](CityOptions& o) { o.altitudes = {5}; },
                      +[](CityOptions& o) { o.photos = -1; }, +[](CityOptions& o) { o.samplesPerPixel = 0; },
-                     +[](CityOptions& o) { o.exposureJitter = std::nan(""); }}) {
+                     +[](CityOptions& o) { o.exposureJitter = std::nan(""); }, +[](CityOptions& o) { o.overlap = 0.5; },
+                     +[](CityOptions& o) { o.photos = 0, o.overlap = 1; }, +[](CityOptions& o) { o.gpsNoise = -1; },
+                     +[](CityOptions& o) { o.heightOffsets = {1e9}; }}) {
     CityOptions options = tiny();
     spoil(options);
     EXPECT_THROW(synthesiseCity(folder_ / "never", options), Error);

@@ -88,9 +88,9 @@ Bytes encodeExif(const ExifFields& f) {
   std::vector<Entry> main{text(0x010f, "tessera"), text(0x0110, "synthetic drone"), number(0x0112, kShort, 1),
                           text(0x0132, when),      number(0x8769, kLong, 0),        number(0x8825, kLong, 0)};
   const std::vector<Entry> camera{
-      rationals(0x829a, {{static_cast<uint32_t>(std::lround(2000 * std::exp2(f.exposure))), 1000000}}),
+      rationals(0x829a, {{static_cast<uint32_t>(std::lround(2e6 * std::exp2(f.exposure - f.isoStops))), 1000000000}}),
       rationals(0x829d, {{28, 10}}),
-      number(0x8827, kShort, 100),
+      number(0x8827, kShort, 100u << f.isoStops),
       text(0x9003, when),
       rationals(0x920a, {{thousandths(f.focalLength35 / 5.6), 1000}}),
       number(0xa405, kShort, static_cast<uint32_t>(std::lround(f.focalLength35)))};

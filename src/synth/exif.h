@@ -9,7 +9,8 @@ namespace tessera {
 struct ExifFields {
   GpsFix gps;
   double focalLength35 = 28;  // millimetres, for a frame 36 mm wide
-  double exposure = 0;        // log2; scales the exposure time, which is 1/500 s at 0
+  double exposure = 0;        // log2; 0 is 1/500 s at ISO 100. What ISO does not add to it, the exposure time does
+  int isoStops = 0;           // log2 of ISO / 100
   double seconds = 0;         // since take-off at 2024-06-21 10:00:00
 };
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <libexif/exif-data.h>
 
+#include <cmath>
 #include <memory>
 
 namespace tessera {
@@ -61,6 +62,16 @@ TEST(Exif, RecordsCameraAndTime) {
   const ExifEntry* time = exif_content_get_entry(data->ifd[EXIF_IFD_EXIF], EXIF_TAG_EXPOSURE_TIME);
   ASSERT_NE(time, nullptr);
   EXPECT_NEAR(rationalAt(time, 0), 2.0 / 500, 1e-9) << "one stop longer";
+}
+
+TEST(Exif, DividesExposureBetweenTimeAndIso) {
+  const Exif data = parsed(encodeExif({.exposure = 0.5, .isoStops = 2}));
+  const ExifEntry* time = exif_content_get_entry(data->ifd[EXIF_IFD_EXIF], EXIF_TAG_EXPOSURE_TIME);
+  const ExifEntry* iso = exif_content_get_entry(data->ifd[EXIF_IFD_EXIF], EXIF_TAG_ISO_SPEED_RATINGS);
+  ASSERT_NE(time, nullptr);
+  ASSERT_NE(iso, nullptr);
+  EXPECT_EQ(exif_get_short(iso->data, exif_data_get_byte_order(data.get())), 400);
+  EXPECT_NEAR(rationalAt(time, 0) * 4, std::exp2(0.5) / 500, 1e-8);
 }
 
 }  // namespace

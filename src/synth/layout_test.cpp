@@ -74,6 +74,38 @@ TEST(Flights, GiveExactlyThePhotosAskedFor) {
       EXPECT_EQ(planFlights(city, camera, {photos, altitudes, 1}).size(), static_cast<size_t>(photos));
 }
 
+// Returns where the ray through a pixel meets the ground.
+Vec2d groundAt(const Station& station, const Camera& camera, double ground, const Vec2d& pixel) {
+  const Vec3d ray = station.worldFromCamera.rotation * *camera.directionInCamera(pixel);
+  const Vec3d eye = station.worldFromCamera.translation;
+  return (eye + ray * ((ground - eye.z()) / ray.z())).head<2>();
+}
+
+TEST(Flights, OverlapInSurveysAsAskedFor) {
+  const CityLayout city = planCity(2, 2, 1);
+  const Camera camera = droneCamera(400, 300);
+  const std::vector<Station> stations = planFlights(city, camera, {0, {60, 120}, 1, 0.75});
+  const double ground = city.terrain(0, 0);
+  int neighbours = 0;
+  for (size_t i = 1; i < stations.size(); ++i) {
+    const Station &a = stations[i - 1], &b = stations[i];
+    if (a.flightNumber != b.flightNumber) continue;
+    // Of all lines and turns: the next photo's middle lies a quarter of the picture away, as far as wind and hand
+    // allow.
+    const Vec2d middle = groundAt(b, camera, ground, {200, 150});
+    const std::optional<Vec2d> pixel =
+        camera.pixelFromCamera(a.worldFromCamera.inverse() * Vec3d(middle.x(), middle.y(), ground));
+    ASSERT_TRUE(pixel);
+    ++neighbours;
+    EXPECT_LT(std::abs(pixel->x() - 200), 0.25 * 400 + 40) << i << ", " << b.flight;
+    EXPECT_LT(std::abs(pixel->y() - 150), 0.25 * 300 + 40) << i << ", " << b.flight;
+  }
+  EXPECT_EQ(stations.back().flightNumber, 5) << "two nadir flights and four oblique ones";
+  EXPECT_EQ(neighbours, static_cast<int>(stations.size()) - 6);
+  EXPECT_GT(stations.size(), 200u);
+  EXPECT_LT(stations.size(), 500u);
+}
+
 TEST(Flights, StayOutsideBuildingsAndHoldLevelAxes) {
   const CityLayout city = planCity(2, 2, 1);
   for (const Station& s : planFlights(city, droneCamera(40, 30), {60, {25, 60}, 1})) {
