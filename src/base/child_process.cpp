@@ -3,19 +3,20 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
 #include <cerrno>
+#include <chrono>
 #include <cstring>
+#include <thread>
 
 #include "base/check.h"
-
-extern char** environ;
 
 namespace tessera {
 
@@ -29,53 +30,92 @@ void Descriptor::close() {
   value_ = -1;
 }
 
-std::string ChildProcess::start(std::vector<std::string> arguments, int input) {
+std::string ChildProcess::start(std::vector<std::string> arguments, const ChildOptions& options) {
   CHECK(!arguments.empty());
   CHECK(!isRunning());
-  messages_.reset(::memfd_create("messages", MFD_CLOEXEC));
+  if (options.log.empty()) {
+    messages_.reset(::memfd_create("messages", MFD_CLOEXEC));
+  } else {
+    messages_.reset(::open(options.log.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
+  }
   if (messages_.get() < 0) return std::strerror(errno);
+  Descriptor nothing;
+  if (options.input < 0) nothing.reset(::open("/dev/null", O_RDONLY | O_CLOEXEC));
+  const int input = options.input < 0 ? nothing.get() : options.input;
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  if (input >= 0) {
-    posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
-  } else {
-    posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  int ends[2] = {-1, -1};
+  if (::pipe2(ends, O_CLOEXEC) != 0) return std::strerror(errno);
+  Descriptor failureOut(ends[0]), failureIn(ends[1]);
+
+  const pid_t parent = ::getpid(), process = ::fork();
+  if (process < 0) return std::strerror(errno);
+  if (process == 0) {
+    // Other threads do not exist here and may have held any lock: only system calls.
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    if (::getppid() == parent && ::dup2(input, STDIN_FILENO) >= 0 && ::dup2(messages_.get(), STDOUT_FILENO) >= 0 &&
+        ::dup2(messages_.get(), STDERR_FILENO) >= 0) {
+      ::execvp(pointers[0], pointers.data());
+    }
+    const int failure = errno;
+    [[maybe_unused]] const ssize_t written = ::write(failureIn.get(), &failure, sizeof failure);
+    ::_exit(127);
   }
-  posix_spawn_file_actions_adddup2(&actions, messages_.get(), STDOUT_FILENO);
-  posix_spawn_file_actions_adddup2(&actions, messages_.get(), STDERR_FILENO);
-  const int failure = ::posix_spawnp(&process_, pointers[0], &actions, nullptr, pointers.data(), environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failure == 0) return "";
-  process_ = -1;
+  failureIn.close();
+  process_ = process;
+  ended_ = false;
+  peakBytes_ = 0;
+  int failure = 0;
+  ssize_t count = 0;
+  while ((count = ::read(failureOut.get(), &failure, sizeof failure)) < 0 && errno == EINTR) {
+  }
+  if (count != sizeof failure) return "";
+  wait();
   return std::strerror(failure);
+}
+
+bool ChildProcess::waitFor(double seconds) {
+  CHECK(isRunning());
+  using std::chrono::steady_clock;
+  const auto end = steady_clock::now() + std::chrono::duration<double>(seconds);
+  while (!ended_) {
+    rusage usage{};
+    const pid_t ended = ::wait4(process_, &status_, WNOHANG, &usage);
+    ended_ = ended == process_;
+    if (ended_) peakBytes_ = int64_t{usage.ru_maxrss} << 10;
+    if (ended_ || steady_clock::now() >= end) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return ended_;
 }
 
 std::string ChildProcess::wait() {
   CHECK(isRunning());
-  int status = 0;
-  while (::waitpid(process_, &status, 0) < 0 && errno == EINTR) {
+  if (!ended_) {
+    rusage usage{};
+    while (::wait4(process_, &status_, 0, &usage) < 0 && errno == EINTR) {
+    }
+    peakBytes_ = int64_t{usage.ru_maxrss} << 10;
   }
   process_ = -1;
-  if (WIFSIGNALED(status)) return fmt::format("was ended by signal {}", WTERMSIG(status));
-  if (!WIFEXITED(status) || WEXITSTATUS(status) == 0) return "";
-  return fmt::format("ended with status {}", WEXITSTATUS(status));
+  ended_ = false;
+  if (WIFSIGNALED(status_)) return fmt::format("was ended by signal {}", WTERMSIG(status_));
+  if (!WIFEXITED(status_) || WEXITSTATUS(status_) == 0) return "";
+  return fmt::format("ended with status {}", WEXITSTATUS(status_));
 }
 
 void ChildProcess::kill() {
   if (!isRunning()) return;
-  ::kill(process_, SIGKILL);
+  if (!ended_) ::kill(process_, SIGKILL);
   wait();
 }
 
-std::string ChildProcess::lastWords() const {
-  char text[400];
+std::string ChildProcess::lastWords(size_t bytes) const {
   const off_t size = ::lseek(messages_.get(), 0, SEEK_END);
-  const off_t from = std::max<off_t>(0, size - static_cast<off_t>(sizeof text));
-  const ssize_t count = ::pread(messages_.get(), text, sizeof text, from);
-  std::string words(text, count > 0 ? static_cast<size_t>(count) : 0);
+  std::string words(std::min(bytes, static_cast<size_t>(std::max<off_t>(size, 0))), '\0');
+  const ssize_t count = ::pread(messages_.get(), words.data(), words.size(), size - static_cast<off_t>(words.size()));
+  words.resize(count > 0 ? static_cast<size_t>(count) : 0);
   while (!words.empty() && std::isspace(static_cast<unsigned char>(words.back()))) words.pop_back();
   return words;
 }

@@ -1,10 +1,14 @@
-// A program that runs beside this one, never through a shell: its arguments are passed as they are.
+// A program that runs beside this one, never through a shell: its arguments are passed as they are. It is killed when
+// the thread that started it ends, whatever ends it: no program is left behind.
 #pragma once
 
 #include <sys/types.h>
 
+#include <cstdint>
 #include <string>
 #include <vector>
+
+#include "base/file.h"
 
 namespace tessera {
 
@@ -25,6 +29,11 @@ class Descriptor {
   int value_ = -1;
 };
 
+struct ChildOptions {
+  int input = -1;  // a descriptor that it reads as its standard input; -1: it has none
+  fs::path log;    // a file to which its standard output and error output are appended; empty: they are kept in memory
+};
+
 class ChildProcess {
  public:
   ChildProcess() = default;
@@ -32,19 +41,25 @@ class ChildProcess {
   ChildProcess(const ChildProcess&) = delete;
   ChildProcess& operator=(const ChildProcess&) = delete;
 
-  // Starts the program arguments[0], which is looked up in PATH. `input`: a descriptor that it reads as its standard
-  // input; -1: it has none. Returns an empty text, or why the program cannot be started.
-  std::string start(std::vector<std::string> arguments, int input = -1);
+  // Starts the program arguments[0], which is looked up in PATH. Returns an empty text, or why it cannot be started.
+  std::string start(std::vector<std::string> arguments, const ChildOptions& options = {});
   bool isRunning() const { return process_ > 0; }  // started, and wait was not called
+  // Waits for its end, at most for so long. Returns whether it has ended; then `wait` says how.
+  bool waitFor(double seconds);
   // Waits for its end. Returns an empty text if it reported success, else how it ended.
   std::string wait();
   void kill();
   // The end of what it wrote to its standard output and error output.
-  std::string lastWords() const;
+  std::string lastWords(size_t bytes = 400) const;
+  // The largest resident size in bytes of the program, or of one that it ran itself; 0 before it has ended.
+  int64_t peakBytes() const { return peakBytes_; }
 
  private:
   pid_t process_ = -1;
-  Descriptor messages_;  // a memory file
+  bool ended_ = false;
+  int status_ = 0;
+  int64_t peakBytes_ = 0;
+  Descriptor messages_;  // a memory file, or the log
 };
 
 }  // namespace tessera

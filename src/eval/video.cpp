@@ -67,7 +67,7 @@ VideoWriter::VideoWriter(fs::path path, const VideoOptions& options) : state_(st
   state.frames.reset(ends[0]);
   const Descriptor theirs(ends[1]);
 
-  const std::string failure = state.process.start(argumentsFor(options, state.partial), theirs.get());
+  const std::string failure = state.process.start(argumentsFor(options, state.partial), {.input = theirs.get()});
   if (failure.empty()) return;
   throw Error(options.program, "", "the program that encodes video cannot be started: " + failure,
               "install it (apt-get install ffmpeg), or render to a folder of PNGs");
