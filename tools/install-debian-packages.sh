@@ -8,7 +8,7 @@ packages=(
   libhwy-dev libeigen3-dev libembree-dev libmeshoptimizer-dev
   libjpeg62-turbo-dev libspng-dev libwebp-dev libopenexr-dev libexif-dev
   libcli11-dev libfmt-dev libspdlog-dev nlohmann-json3-dev libtomlplusplus-dev
-  libgeographiclib-dev libassimp-dev
+  libgeographiclib-dev libassimp-dev libsqlite3-dev
   libboost-dev zlib1g-dev
   libvulkan-dev libvulkan-volk-dev mesa-vulkan-drivers vulkan-validationlayers glslang-tools
   libglfw3-dev libimgui-dev

@@ -52,6 +52,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.option_defaults()->always_capture_default();
   app.set_version_flag("--version", TESSERA_VERSION);
+  tessera::addRunVerb(app);
   tessera::addSynthVerb(app);
   tessera::addImportVerb(app);
   tessera::addTrainVerb(app);

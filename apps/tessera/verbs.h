@@ -13,6 +13,7 @@
 namespace tessera {
 
 // Each function adds one verb to `app`; the verb's work is done when it is given on the command line.
+void addRunVerb(CLI::App& app);
 void addSynthVerb(CLI::App& app);
 void addImportVerb(CLI::App& app);
 void addTrainVerb(CLI::App& app);

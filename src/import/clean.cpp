@@ -61,6 +61,7 @@ void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
   std::vector<Photo> photos;
   std::vector<bool> inverted;
   std::vector<double> exrUnit;
+  std::vector<int> flight;
   std::vector<int> newIndex(capture.photos.size(), -1);
   std::vector<int> newCamera(capture.cameras.size(), -1);
   std::vector<Camera> cameras;
@@ -69,6 +70,7 @@ void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
     photos.push_back(std::move(capture.photos[old]));
     inverted.push_back(old < source.maskIsInverted.size() && source.maskIsInverted[old]);
     exrUnit.push_back(old < source.exrUnit.size() ? source.exrUnit[old] : 1);
+    if (!source.flight.empty()) flight.push_back(source.flight[old]);
     auto& camera = newCamera[static_cast<size_t>(photos.back().camera)];
     if (camera < 0) {
       camera = static_cast<int>(cameras.size());
@@ -80,6 +82,7 @@ void keepPhotos(SourceCapture& source, const std::vector<size_t>& order) {
   capture.cameras = std::move(cameras);
   source.maskIsInverted = std::move(inverted);
   source.exrUnit = std::move(exrUnit);
+  source.flight = std::move(flight);
   std::vector<Observation> observations;
   for (Observation observation : capture.observations) {
     const int photo = newIndex[observation.photo];

@@ -223,8 +223,7 @@ std::optional<fs::path> findColmapModel(const fs::path& source) {
   return std::nullopt;
 }
 
-SourceCapture readColmap(const fs::path& source) {
-  const fs::path folder = findColmapModel(source).value_or(source);
+ColmapModel readColmapModel(const fs::path& folder) {
   std::error_code status;
   const bool binary = fs::is_regular_file(folder / "cameras.bin", status);
   const fs::path pointFile = folder / (binary ? "points3D.bin" : "points3D.txt");
@@ -240,7 +239,12 @@ SourceCapture readColmap(const fs::path& source) {
     model = decodeColmapText(cameras, images, hasPoints ? readTextFile(pointFile) : std::string{}, reason);
   }
   if (!model) throw Error(folder.string(), "", reason, "write the model again with colmap model_converter");
-  return captureFromColmap(*model, findImages(source, folder));
+  return *std::move(model);
+}
+
+SourceCapture readColmap(const fs::path& source) {
+  const fs::path folder = findColmapModel(source).value_or(source);
+  return captureFromColmap(readColmapModel(folder), findImages(source, folder));
 }
 
 }  // namespace tessera

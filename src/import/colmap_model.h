@@ -64,8 +64,11 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
 // Returns the folder of the sparse model in a source folder (sparse/0, sparse, colmap/sparse/0, or the folder itself;
 // the largest of several numbered ones, with a warning), or nothing if it has none.
 std::optional<fs::path> findColmapModel(const fs::path& source);
-// Reads the model of a source folder. Throws Error naming the file or folder if it cannot be read or decoded. Warns if
-// there is no points3D file.
+// Reads the files of a model in a folder. Throws Error naming the file or folder if they cannot be read or decoded.
+// Warns if there is no points3D file.
+ColmapModel readColmapModel(const fs::path& folder);
+// Reads the model of a source folder, with its photos. Throws Error naming the file or folder if it cannot be read or
+// decoded. Warns if there is no points3D file.
 SourceCapture readColmap(const fs::path& source);
 
 }  // namespace tessera

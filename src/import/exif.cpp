@@ -2,7 +2,10 @@
 
 #include <libexif/exif-data.h>
 
+#include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <memory>
 
 namespace tessera {
@@ -12,11 +15,16 @@ struct DeleteExif {
   void operator()(ExifData* data) const { exif_data_unref(data); }
 };
 
-const ExifEntry* gpsEntry(const ExifData& data, int tag, ExifFormat format, unsigned long components) {
-  const ExifEntry* entry = exif_content_get_entry(data.ifd[EXIF_IFD_GPS], static_cast<ExifTag>(tag));
+const ExifEntry* findEntry(const ExifData& data, ExifIfd directory, int tag, ExifFormat format,
+                           unsigned long components = 1) {
+  const ExifEntry* entry = exif_content_get_entry(data.ifd[directory], static_cast<ExifTag>(tag));
   const bool fits = entry != nullptr && entry->data != nullptr && entry->format == format &&
                     entry->components >= components && entry->size >= components * exif_format_get_size(format);
   return fits ? entry : nullptr;
+}
+
+const ExifEntry* gpsEntry(const ExifData& data, int tag, ExifFormat format, unsigned long components) {
+  return findEntry(data, EXIF_IFD_GPS, tag, format, components);
 }
 
 std::optional<double> rational(const ExifData& data, const ExifEntry& entry, size_t index) {
@@ -51,6 +59,69 @@ std::optional<GpsFix> readGpsFix(const ExifData& data) {
   return fix;
 }
 
+// Returns a positive number, or 0.
+double positive(const ExifData& data, ExifIfd directory, int tag) {
+  double value = 0;
+  if (const ExifEntry* entry = findEntry(data, directory, tag, EXIF_FORMAT_RATIONAL)) {
+    value = rational(data, *entry, 0).value_or(0);
+  } else if (const ExifEntry* whole = findEntry(data, directory, tag, EXIF_FORMAT_SHORT)) {
+    value = exif_get_short(whole->data, exif_data_get_byte_order(const_cast<ExifData*>(&data)));
+  } else if (const ExifEntry* wide = findEntry(data, directory, tag, EXIF_FORMAT_LONG)) {
+    value = exif_get_long(wide->data, exif_data_get_byte_order(const_cast<ExifData*>(&data)));
+  }
+  return value > 0 && value < 1e9 ? value : 0;
+}
+
+// Returns a text without blanks at its ends and without control characters, of limited length.
+std::string text(const ExifData& data, ExifIfd directory, int tag) {
+  constexpr size_t kMaxLength = 100;
+  const ExifEntry* entry = findEntry(data, directory, tag, EXIF_FORMAT_ASCII);
+  if (entry == nullptr) return "";
+  std::string value;
+  for (size_t i = 0; i < entry->size && entry->data[i] != 0 && value.size() < kMaxLength; ++i)
+    value += entry->data[i] >= 32 && entry->data[i] < 127 ? static_cast<char>(entry->data[i]) : '?';
+  while (!value.empty() && value.back() == ' ') value.pop_back();
+  return value.substr(std::min(value.find_first_not_of(' '), value.size()));
+}
+
+CameraTags readCamera(const ExifData& data) {
+  // Tags of EXIF 2.3 that libexif 0.6 does not name.
+  constexpr int kBodySerialNumber = 0xa431, kLensModel = 0xa434;
+  CameraTags camera;
+  camera.make = text(data, EXIF_IFD_0, EXIF_TAG_MAKE);
+  camera.model = text(data, EXIF_IFD_0, EXIF_TAG_MODEL);
+  camera.serial = text(data, EXIF_IFD_EXIF, kBodySerialNumber);
+  camera.lens = text(data, EXIF_IFD_EXIF, kLensModel);
+  camera.focalLength = positive(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH);
+  camera.focalLength35 = positive(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_LENGTH_IN_35MM_FILM);
+  const double resolution = positive(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_X_RESOLUTION);
+  const double unit = positive(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_RESOLUTION_UNIT);
+  camera.pixelsPerMillimetre = unit == 3 ? resolution / 10 : unit == 4 ? resolution : resolution / 25.4;
+  return camera;
+}
+
+// Reads "2024:06:21 11:02:05", and the fraction of the second.
+std::optional<double> readTime(const ExifData& data) {
+  std::string when = text(data, EXIF_IFD_EXIF, EXIF_TAG_DATE_TIME_ORIGINAL);
+  if (when.empty()) when = text(data, EXIF_IFD_0, EXIF_TAG_DATE_TIME);
+  int year = 0, month = 0, day = 0, hour = 0, minute = 0, second = 0;
+  if (std::sscanf(when.c_str(), "%4d:%2d:%2d %2d:%2d:%2d", &year, &month, &day, &hour, &minute, &second) != 6)
+    return std::nullopt;
+  const std::chrono::year_month_day date{std::chrono::year(year), std::chrono::month(static_cast<unsigned>(month)),
+                                         std::chrono::day(static_cast<unsigned>(day))};
+  if (year < 1970 || !date.ok() || hour < 0 || hour > 23 || minute < 0 || minute > 59 || second < 0 || second > 60)
+    return std::nullopt;
+  const auto days = std::chrono::sys_days(date).time_since_epoch().count();
+  const std::string fraction = text(data, EXIF_IFD_EXIF, EXIF_TAG_SUB_SEC_TIME_ORIGINAL);
+  double part = 0, unit = 0.1;
+  for (const char digit : fraction) {
+    if (digit < '0' || digit > '9') break;
+    part += unit * (digit - '0');
+    unit /= 10;
+  }
+  return 86400.0 * static_cast<double>(days) + 3600 * hour + 60 * minute + second + part;
+}
+
 bool makesSense(const GpsFix& fix) {
   return std::abs(fix.latitude) <= 90 && std::abs(fix.longitude) <= 180 && std::abs(fix.altitude) < 1e5 &&
          (fix.latitude != 0 || fix.longitude != 0);  // a receiver without a fix writes 0, 0
@@ -66,7 +137,16 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
   jpeg = jpeg.first(std::min(jpeg.size(), kMax));
   const std::unique_ptr<ExifData, DeleteExif> data(
       exif_data_new_from_data(bytes, static_cast<unsigned int>(jpeg.size())));
-  if (data != nullptr) tags.gps = readGpsFix(*data);
+  if (data != nullptr) {
+    tags.gps = readGpsFix(*data);
+    tags.camera = readCamera(*data);
+    tags.exposure = {positive(*data, EXIF_IFD_EXIF, EXIF_TAG_EXPOSURE_TIME),
+                     positive(*data, EXIF_IFD_EXIF, EXIF_TAG_ISO_SPEED_RATINGS),
+                     positive(*data, EXIF_IFD_EXIF, EXIF_TAG_FNUMBER)};
+    tags.takenAt = readTime(*data);
+    const double orientation = positive(*data, EXIF_IFD_0, EXIF_TAG_ORIENTATION);
+    if (orientation >= 1 && orientation <= 8) tags.orientation = static_cast<int>(orientation);
+  }
 
   const std::string_view text(reinterpret_cast<const char*>(jpeg.data()), jpeg.size());
   const size_t begin = text.find("<x:xmpmeta");
@@ -78,6 +158,7 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
     if (tags.gps && xmp.relativeAltitude && std::abs(*xmp.relativeAltitude) < 1e5) {
       tags.gps->relativeAltitude = *xmp.relativeAltitude;
     }
+    tags.camera.isThermal = xmp.isInfrared;
     if (xmp.gimbalPitch && std::abs(*xmp.gimbalPitch) <= 180) {
       tags.gimbal = GimbalAngles{xmp.gimbalYaw.value_or(0), *xmp.gimbalPitch, xmp.gimbalRoll.value_or(0)};
     }

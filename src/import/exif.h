@@ -1,10 +1,11 @@
-// The GPS position of a photo, from its EXIF (libexif) or from the XMP that drones add, and the gimbal angles from that
-// XMP. The orientation tag of EXIF is not read: pixels are used as they are stored (see base/image_io.h).
+// What a photo says of itself in its EXIF (libexif) and in the XMP that drones add: position, gimbal angles, camera,
+// time and exposure. Pixels are used as they are stored (see base/image_io.h), whatever the orientation tag says.
 // Source: EXIF 2.3; DJI's XMP namespace http://www.dji.com/drone-dji/1.0/.
 #pragma once
 
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include "base/file.h"
@@ -18,9 +19,28 @@ struct GimbalAngles {
   double yaw = 0, pitch = 0, roll = 0;
 };
 
+// The camera. Texts are empty and numbers 0 where the tags are missing.
+struct CameraTags {
+  std::string make, model, serial, lens;
+  double focalLength = 0;          // millimetres
+  double focalLength35 = 0;        // millimetres, of a camera with the same field of view and a picture of 36 × 24 mm
+  double pixelsPerMillimetre = 0;  // of the sensor, along its width
+  bool isThermal = false;          // an infrared camera beside the one for visible light, as the XMP says
+
+  bool operator==(const CameraTags&) const = default;
+};
+
+struct ExposureTags {
+  double seconds = 0, iso = 0, aperture = 0;  // 0: unknown
+};
+
 struct PhotoTags {
   std::optional<GpsFix> gps;
   std::optional<GimbalAngles> gimbal;
+  CameraTags camera;
+  ExposureTags exposure;
+  std::optional<double> takenAt;  // seconds since 1970 by the camera's clock, whose time zone is unknown
+  int orientation = 1;            // of EXIF, 1 to 8: how viewers turn the picture
 };
 
 // Decodes the tags of a JPEG file from its untrusted bytes (all of them, or the first part). Missing and implausible
@@ -32,6 +52,7 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg);
 struct XmpTags {
   std::optional<double> latitude, longitude, absoluteAltitude, relativeAltitude;
   std::optional<double> gimbalYaw, gimbalPitch, gimbalRoll;
+  bool isInfrared = false;  // ImageSource, of drones with several cameras
 };
 XmpTags decodeXmp(std::string_view xmp);
 

@@ -29,6 +29,12 @@ TEST(Xmp, ReadsElements) {
   EXPECT_EQ(tags.longitude, 77);
 }
 
+TEST(Xmp, TellsInfraredPicturesOfTwoCameras) {
+  EXPECT_TRUE(decodeXmp("drone-dji:ImageSource=\"InfraredCamera\"").isInfrared);
+  EXPECT_FALSE(decodeXmp("drone-dji:ImageSource=\"WideCamera\"").isInfrared);
+  EXPECT_FALSE(decodeXmp("drone-dji:GimbalYawDegree=\"1\"").isInfrared);
+}
+
 TEST(Xmp, IgnoresOtherNamesAndOtherText) {
   const XmpTags tags = decodeXmp(
       "x:GpsLatitudeRef=\"5\" GpsLatitude=\"6\" x:GpsLongitude=\"east\" x:RelativeAltitude=\"1e999\" "
@@ -156,6 +162,20 @@ TEST(Exif, ReadsARealDrone) {
   ASSERT_TRUE(tags.gimbal.has_value());
   EXPECT_EQ(tags.gimbal->pitch, -89.9);
   EXPECT_EQ(tags.gimbal->yaw, 45);
+  EXPECT_EQ(tags.camera.make, "DJI");
+  EXPECT_EQ(tags.camera.model, "FC300S");
+  EXPECT_FALSE(tags.camera.isThermal);
+  EXPECT_GT(tags.camera.focalLength35, 15);
+  EXPECT_LT(tags.camera.focalLength35, 25);
+  EXPECT_GT(tags.exposure.seconds, 1e-4);
+  EXPECT_LT(tags.exposure.seconds, 0.1);
+  EXPECT_GE(tags.exposure.iso, 100);
+  EXPECT_NEAR(tags.exposure.aperture, 2.8, 1e-6);
+  ASSERT_TRUE(tags.takenAt);
+  const auto other = decodePhotoTags(readFile(beach / "images/DJI_0019.JPG")).takenAt;
+  ASSERT_TRUE(other);
+  EXPECT_GT(*other, *tags.takenAt);
+  EXPECT_LT(*other, *tags.takenAt + 60);
 }
 
 }  // namespace

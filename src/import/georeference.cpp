@@ -6,6 +6,8 @@
 #include <GeographicLib/LocalCartesian.hpp>
 #include <algorithm>
 
+#include "base/check.h"
+#include "base/order_statistics.h"
 #include "base/random.h"
 
 namespace tessera {
@@ -32,13 +34,66 @@ bool isLine(const Points& points) {
   return !(first > 0) || !(second > 0.02 * first);
 }
 
-std::vector<int> agreeing(const Mat4d& enuFromWorld, const Points& world, const Points& enu) {
-  std::vector<int> inliers;
-  for (Eigen::Index i = 0; i < world.cols(); ++i) {
-    const Vec3d mapped = (enuFromWorld * world.col(i).homogeneous()).head<3>();
-    if ((mapped - enu.col(i)).norm() < kGpsTolerance) inliers.push_back(static_cast<int>(i));
+// Fixes of photos, and the errors of altitudes that their flights share.
+struct Fixes {
+  Points world, enu;                       // 3 × n; `enu` as measured
+  std::vector<int> flight;                 // by fix
+  std::vector<std::vector<int>> ofFlight;  // fixes by flight
+
+  Points corrected(const std::vector<double>& tooHigh) const {
+    Points places = enu;
+    for (Eigen::Index i = 0; i < places.cols(); ++i)
+      places(2, i) -= tooHigh[static_cast<size_t>(flight[static_cast<size_t>(i)])];
+    return places;
   }
-  return inliers;
+};
+
+// A similarity, and for each flight how far its altitudes exceed those that the similarity gives.
+struct Fit {
+  Mat4d enuFromWorld = Mat4d::Identity();
+  std::vector<double> tooHigh;
+  std::vector<int> inliers;
+};
+
+constexpr size_t kLeastOfFlight = 3;  // fixes
+
+// Finds the heights by which flights are too high, and the fixes that agree.
+void judge(const Fixes& fixes, Fit& fit) {
+  const Points mapped = (fit.enuFromWorld * fixes.world.colwise().homogeneous()).topRows<3>();
+  const auto above = [&](int i) { return fixes.enu(2, i) - mapped(2, i); };
+  fit.tooHigh.assign(fixes.ofFlight.size(), 0);
+  const bool isOne = fixes.ofFlight.size() == 1;
+  for (size_t f = 0; f < fixes.ofFlight.size() && !isOne; ++f) {
+    if (fixes.ofFlight[f].size() < kLeastOfFlight) continue;
+    std::vector<double> heights;
+    for (const int i : fixes.ofFlight[f]) heights.push_back(above(i));
+    fit.tooHigh[f] = upperMedian(heights);
+  }
+  const Points places = fixes.corrected(fit.tooHigh);
+  fit.inliers.clear();
+  for (Eigen::Index i = 0; i < places.cols(); ++i) {
+    if ((mapped.col(i) - places.col(i)).norm() < kGpsTolerance) fit.inliers.push_back(static_cast<int>(i));
+  }
+}
+
+// Fits the similarity to the fixes that agree, as long as they determine one.
+void refine(const Fixes& fixes, Fit& fit) {
+  const Points world = selectColumns(fixes.world, fit.inliers);
+  if (fit.inliers.size() < 3 || isLine(world)) return;
+  fit.enuFromWorld = Eigen::umeyama(world, selectColumns(fixes.corrected(fit.tooHigh), fit.inliers));
+  judge(fixes, fit);
+}
+
+// Altitudes are relative to the median flight.
+void shiftToMedianFlight(const Fixes& fixes, Fit& fit) {
+  std::vector<double> known;
+  for (size_t f = 0; f < fixes.ofFlight.size(); ++f)
+    if (fixes.ofFlight[f].size() >= kLeastOfFlight) known.push_back(fit.tooHigh[f]);
+  if (fixes.ofFlight.size() == 1 || known.empty()) return;
+  std::sort(known.begin(), known.end());
+  const double middle = 0.5 * (known[(known.size() - 1) / 2] + known[known.size() / 2]);
+  fit.enuFromWorld(2, 3) += middle;
+  judge(fixes, fit);
 }
 
 }  // namespace
@@ -50,13 +105,20 @@ Vec3d enuFromGps(const GeoFrame& frame, double latitude, double longitude, doubl
   return enu;
 }
 
-std::optional<Georeference> georeference(const std::vector<Photo>& photos, std::string& reason) {
+std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,
+                                         std::string& reason) {
+  CHECK((flights.empty() || flights.size() == photos.size()));
   std::vector<const Photo*> fixed;
+  Fixes fixes;
   bool allRelative = true;
   Georeference result;
   double meanRelative = 0;
   for (const Photo& photo : photos) {
     if (!photo.gps) continue;
+    const auto flight = flights.empty() ? 0 : static_cast<size_t>(flights[static_cast<size_t>(&photo - photos.data())]);
+    if (flight >= fixes.ofFlight.size()) fixes.ofFlight.resize(flight + 1);
+    fixes.ofFlight[flight].push_back(static_cast<int>(fixed.size()));
+    fixes.flight.push_back(static_cast<int>(flight));
     fixed.push_back(&photo);
     allRelative = allRelative && photo.gps->relativeAltitude != 0;
     result.frame.latitude += photo.gps->latitude;
@@ -73,7 +135,9 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, std::
   for (double* mean : {&result.frame.latitude, &result.frame.longitude, &result.frame.altitude, &meanRelative})
     *mean /= n;
 
-  Points world(3, n), enu(3, n);
+  Points &world = fixes.world, &enu = fixes.enu;
+  world.resize(3, n);
+  enu.resize(3, n);
   for (int i = 0; i < n; ++i) {
     const GpsFix& gps = *fixed[static_cast<size_t>(i)]->gps;
     const double altitude = allRelative ? result.frame.altitude + gps.relativeAltitude - meanRelative : gps.altitude;
@@ -90,33 +154,45 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, std::
     return std::nullopt;
   }
 
-  std::vector<int> best;
+  Fit best;
   const RandomStream random(1991, 0);
   constexpr uint64_t kTrials = 1000;
-  for (uint64_t trial = 0; trial < kTrials && static_cast<int>(best.size()) < n; ++trial) {
+  for (uint64_t trial = 0; trial < kTrials && static_cast<int>(best.inliers.size()) < n; ++trial) {
     std::vector<int> sample;
-    for (uint64_t k = 0; sample.size() < 3; ++k) {
-      const auto candidate = static_cast<int>(random.below(trial * 64 + k, static_cast<uint32_t>(n)));
+    // All of one flight, whose altitudes have the same error.
+    const auto first = static_cast<size_t>(random.below(trial * 64, static_cast<uint32_t>(n)));
+    const std::vector<int>& among = fixes.ofFlight[static_cast<size_t>(fixes.flight[first])];
+    for (uint64_t k = 1; sample.size() < std::min<size_t>(3, among.size()) && k < 64; ++k) {
+      const int candidate = among[random.below(trial * 64 + k, static_cast<uint32_t>(among.size()))];
       if (std::find(sample.begin(), sample.end(), candidate) == sample.end()) sample.push_back(candidate);
     }
+    if (sample.size() < 3) continue;
     const Points from = selectColumns(world, sample), to = selectColumns(enu, sample);
     if (isLine(from) || isLine(to)) continue;
-    std::vector<int> inliers = agreeing(Eigen::umeyama(from, to), world, enu);
+    Fit fit;
+    fit.enuFromWorld = Eigen::umeyama(from, to);
+    judge(fixes, fit);
     // Refine on all inliers: three noisy fixes of nearby photos alone constrain the rotation too weakly.
-    for (int round = 0; round < 3 && inliers.size() >= 3 && !isLine(selectColumns(world, inliers)); ++round) {
-      inliers = agreeing(Eigen::umeyama(selectColumns(world, inliers), selectColumns(enu, inliers)), world, enu);
-    }
-    if (inliers.size() > best.size()) best = std::move(inliers);
+    for (int round = 0; round < 3; ++round) refine(fixes, fit);
+    if (fit.inliers.size() > best.inliers.size()) best = std::move(fit);
   }
-  if (best.size() < 3 || 2 * static_cast<int>(best.size()) < n || isLine(selectColumns(world, best))) {
-    reason = fmt::format("only {} of {} GPS fixes agree with the poses to within {} m", best.size(), n, kGpsTolerance);
+  if (best.inliers.size() < 3 || 2 * static_cast<int>(best.inliers.size()) < n ||
+      isLine(selectColumns(world, best.inliers))) {
+    reason = fmt::format("only {} of {} GPS fixes agree with the poses to within {} m", best.inliers.size(), n,
+                         kGpsTolerance);
     return std::nullopt;
   }
-  const Points from = selectColumns(world, best), to = selectColumns(enu, best);
-  result.frame.enuFromWorld = Eigen::umeyama(from, to);
-  result.inliers = static_cast<int>(best.size());
+  // Similarity and heights are fitted in turns.
+  constexpr int kLastRounds = 20;
+  for (int round = 0; round < kLastRounds; ++round) refine(fixes, best);
+  shiftToMedianFlight(fixes, best);
+  result.frame.enuFromWorld = best.enuFromWorld;
+  result.heightsTooHigh = best.tooHigh;
+  result.inliers = static_cast<int>(best.inliers.size());
+  const Points from = selectColumns(world, best.inliers),
+               to = selectColumns(fixes.corrected(best.tooHigh), best.inliers);
   const Points residual = (result.frame.enuFromWorld * from.colwise().homogeneous()).topRows<3>() - to;
-  result.rmsMetres = residual.norm() / std::sqrt(static_cast<double>(best.size()));
+  result.rmsMetres = residual.norm() / std::sqrt(static_cast<double>(best.inliers.size()));
   if (result.rmsMetres > spread / 3) {
     reason = fmt::format("the GPS fixes deviate from the poses by {:.1f} m, over a spread of {:.1f} m",
                          result.rmsMetres, spread);

@@ -15,7 +15,8 @@ namespace tessera {
 struct Georeference {
   GeoFrame frame;  // origin: the mean of the photos' fixes; enuFromWorld: the similarity
   int inliers = 0, fixes = 0;
-  double rmsMetres = 0;  // of the inliers, in three dimensions
+  double rmsMetres = 0;                // of the inliers, in three dimensions
+  std::vector<double> heightsTooHigh;  // by flight: metres by which its altitudes exceed those of the median flight
 };
 
 inline constexpr double kGpsTolerance = 8;  // metres
@@ -26,8 +27,11 @@ inline constexpr double kMinGpsSpread = 5;  // metres
 // near one (standard deviation across it below kMinGpsSpread, where the fit would follow noise), if fewer than half of
 // them agree within kGpsTolerance, or if the residual exceeds a third of that deviation. Altitudes are the drone's
 // heights above take-off where every photo has one (its barometer is far more precise than GPS), shifted to the mean of
-// the absolute altitudes.
-std::optional<Georeference> georeference(const std::vector<Photo>& photos, std::string& reason);
+// the absolute altitudes. `flights`: the flight of each photo, from 0 on; empty: all are of one. Altitudes of one
+// flight may be wrong by the same height (GPS jumps, and take-off places differ), which is estimated for flights of
+// three fixes or more.
+std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,
+                                         std::string& reason);
 
 // Returns the position of a fix in the frame's tangent plane: metres east, north and up. Latitude and longitude are in
 // degrees (WGS 84), the altitude in metres with the same reference as the frame's.

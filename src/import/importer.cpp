@@ -74,19 +74,11 @@ std::string shellWord(const fs::path& path) {
   if (photos.readable > 0) {
     throw Error(
         source.string(), "", fmt::format("contains {} photos but no camera poses", photos.readable),
-        fmt::format("{4}find their poses with COLMAP, then import again: "
-                    "colmap feature_extractor --database_path {0} --image_path {1} "
-                    "--ImageReader.camera_model OPENCV --ImageReader.single_camera 1 "
-                    "--SiftExtraction.use_gpu 0 && "
-                    "colmap exhaustive_matcher --database_path {0} --SiftMatching.use_gpu 0 && "
-                    "mkdir -p {2} && "
-                    "colmap mapper --database_path {0} --image_path {1} --output_path {2} && "
-                    "tessera import {3} OUT",
-                    shellWord(source / "database.db"), shellWord(images), shellWord(source / "sparse"),
-                    shellWord(source),
+        fmt::format("{}tessera run {} OUT finds their poses, and trains",
                     photos.convertible > 0 ? fmt::format("convert the {} others ({}) to JPEG if they are wanted; ",
                                                          photos.convertible, photos.firstConvertible)
-                                           : ""));
+                                           : "",
+                    shellWord(images)));
   }
   if (photos.convertible > 0) {
     throw Error(source.string(), "",
@@ -307,13 +299,17 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   }
   checkHoldOut(options.holdout);
   if (!options.maskCommand.empty()) MaskCommand{options.maskCommand};  // throws Error if it is malformed
+  return importSource(readSource(sourcePath), sourcePath.string(), out, options);
+}
+
+Capture importSource(SourceCapture source, const std::string& from, const fs::path& out, const ImportOptions& options) {
+  std::error_code status;
   ThreadPool pool(options.threads);
-  SourceCapture source = readSource(sourcePath);
   if (options.holdout == "auto" && source.splitError) throw *source.splitError;
   const std::vector<PhotoFacts> facts = cleanSource(source, pool);
   Capture& capture = source.capture;
   if (capture.photos.empty()) {
-    throw Error(sourcePath.string(), "", "no photo of it can be used", "see the warnings above");
+    throw Error(from, "", "no photo of it can be used", "see the warnings above");
   }
 
   std::vector<std::optional<GimbalAngles>> gimbals;
@@ -325,7 +321,7 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   fs::create_directories(out, status);
   dropFailed(source, importPictures(source, facts, out, options, orientation.scale, pool));
   if (capture.photos.empty()) {
-    throw Error(sourcePath.string(), "", "no photo of it can be decoded", "see the warnings above");
+    throw Error(from, "", "no photo of it can be decoded", "see the warnings above");
   }
   chooseSplit(source, options.holdout);
   capture.root = out;

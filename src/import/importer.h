@@ -23,6 +23,8 @@
 
 namespace tessera {
 
+struct SourceCapture;
+
 struct ImportOptions {
   int downscale = 1;  // divides width and height, averaging over area
   // every:N, list:FILE or none (see holdout.h); auto: the source's own split, else every:8. A source with a validation
@@ -35,6 +37,10 @@ struct ImportOptions {
 
 // Throws Error if `source` cannot be imported; if it is a plain folder of photos, the error names the commands to run.
 Capture importCapture(const fs::path& source, const fs::path& out, const ImportOptions& options = {});
+
+// The same for photos with poses that are in memory. `from` names them in messages. Throws Error as above, but does not
+// check `options`.
+Capture importSource(SourceCapture source, const std::string& from, const fs::path& out, const ImportOptions& options);
 
 // Returns the format that a folder is recognised as: "COLMAP model", "transforms.json", ...; empty if no format
 // matches.

@@ -80,6 +80,19 @@ Up findUp(const std::vector<Photo>& photos, const std::vector<std::optional<Gimb
   return {normal, "up from the plane of the cameras"};
 }
 
+// A flight whose altitudes are wrong is named by its first photo.
+void warnOfHeights(const SourceCapture& source, const Georeference& fit) {
+  constexpr double kLeastMetres = 3;  // less is usual for GPS
+  for (size_t flight = 0; flight < fit.heightsTooHigh.size(); ++flight) {
+    const double metres = fit.heightsTooHigh[flight];
+    if (std::abs(metres) < kLeastMetres) continue;
+    const auto first = std::find(source.flight.begin(), source.flight.end(), static_cast<int>(flight));
+    warn("the altitudes of the flight that begins with {} are {:.1f} m {} for those of the others; corrected",
+         source.capture.photos[static_cast<size_t>(first - source.flight.begin())].name, std::abs(metres),
+         metres > 0 ? "too high" : "too low");
+  }
+}
+
 Mat4d translation(const Vec3d& t) {
   Mat4d matrix = Mat4d::Identity();
   matrix.topRightCorner<3, 1>() = t;
@@ -109,11 +122,12 @@ Orientation orientWorld(SourceCapture& source, const std::vector<std::optional<G
   if (source.isOurs || capture.photos.empty()) return {"a capture of our own: its world is kept", 1};
   Orientation orientation;
   std::string why;
-  if (const auto fit = georeference(capture.photos, why)) {
+  if (const auto fit = georeference(capture.photos, source.flight, why)) {
     capture.geo = fit->frame;
     orientation.scale = applySimilarity(capture, fit->frame.enuFromWorld);
     orientation.how = fmt::format("east, north, up in metres from {} of {} GPS fixes, with residuals of {:.2f} m",
                                   fit->inliers, fit->fixes, fit->rmsMetres);
+    warnOfHeights(source, *fit);
   } else {
     const bool hasGps =
         std::any_of(capture.photos.begin(), capture.photos.end(), [](const Photo& p) { return !!p.gps; });

@@ -94,7 +94,7 @@ TEST(Orient, ToleratesNoiseAndAThirdOfWildFixes) {
     source.capture.photos[static_cast<size_t>(i)].gps->latitude += 0.01;  // a kilometre
   scramble(source);
   std::string reason;
-  const auto fit = georeference(source.capture.photos, reason);
+  const auto fit = georeference(source.capture.photos, {}, reason);
   ASSERT_TRUE(fit.has_value()) << reason;
   EXPECT_EQ(fit->inliers, 14);
   EXPECT_LT(fit->rmsMetres, 2);
@@ -114,11 +114,34 @@ TEST(Orient, PrefersTheBarometerToGpsHeights) {
   expectEastNorthUp(source.capture, 1e-2);
 }
 
+// Twenty photos of three flights, of which the second is at another height and 15 m too high by its GPS.
+TEST(Orient, CorrectsTheHeightsOfAFlight) {
+  SourceCapture source = flight(0.5);
+  for (size_t i = 0; i < 20; ++i) {
+    source.flight.push_back(i < 6 ? 0 : i < 14 ? 1 : 2);
+    Photo& photo = source.capture.photos[i];
+    if (source.flight.back() != 1) continue;
+    photo.worldFromCamera.translation.z() += 40;
+    photo.gps->altitude += 40 + 15;
+  }
+  scramble(source);
+  std::string reason;
+  const auto fit = georeference(source.capture.photos, source.flight, reason);
+  ASSERT_TRUE(fit.has_value()) << reason;
+  EXPECT_EQ(fit->inliers, 20);
+  ASSERT_EQ(fit->heightsTooHigh.size(), 3u);
+  EXPECT_NEAR(fit->heightsTooHigh[0], 0, 2);
+  EXPECT_NEAR(fit->heightsTooHigh[1], 15, 2);
+  EXPECT_NEAR(fit->heightsTooHigh[2], 0, 2);
+  orientWorld(source, {});
+  expectEastNorthUp(source.capture, 1.5);
+}
+
 TEST(Georeference, RejectsFixesThatDoNotDetermineARotation) {
   std::string reason;
   SourceCapture few = flight();
   for (size_t i = 2; i < few.capture.photos.size(); ++i) few.capture.photos[i].gps.reset();
-  EXPECT_FALSE(georeference(few.capture.photos, reason).has_value());
+  EXPECT_FALSE(georeference(few.capture.photos, {}, reason).has_value());
   EXPECT_EQ(reason, "2 photos with GPS; three are needed");
 
   SourceCapture line = flight();
@@ -127,7 +150,7 @@ TEST(Georeference, RejectsFixesThatDoNotDetermineARotation) {
     line.capture.photos[i].worldFromCamera.translation.z() = 60;
     line.capture.photos[i].gps->altitude = 160;
   }
-  EXPECT_FALSE(georeference(line.capture.photos, reason).has_value());
+  EXPECT_FALSE(georeference(line.capture.photos, {}, reason).has_value());
   EXPECT_NE(reason.find("line"), std::string::npos) << reason;
 
   SourceCapture unrelated = flight();
@@ -138,7 +161,7 @@ TEST(Georeference, RejectsFixesThatDoNotDetermineARotation) {
         Vec3d(random.uniformDouble(draw), random.uniformDouble(draw + 1), random.uniformDouble(draw + 2));
     draw += 3;
   }
-  EXPECT_FALSE(georeference(unrelated.capture.photos, reason).has_value());
+  EXPECT_FALSE(georeference(unrelated.capture.photos, {}, reason).has_value());
 }
 
 void forgetGps(SourceCapture& source) {

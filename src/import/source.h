@@ -21,6 +21,7 @@ struct SourceCapture {
   // By photo: world units per unit of an EXR depth map; photos beyond the end of the vector have 1. Integer maps have
   // Photo::depthUnit.
   std::vector<double> exrUnit;
+  std::vector<int> flight;  // by photo; empty: unknown
 };
 
 }  // namespace tessera

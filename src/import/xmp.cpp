@@ -1,4 +1,4 @@
-// Reads the few relevant numbers of a drone's XMP without an XML parser: a name, then = and a quoted value, or > and
+// Reads the few relevant values of a drone's XMP without an XML parser: a name, then = and a quoted value, or > and
 // the text up to the next <.
 #include <array>
 #include <charconv>
@@ -27,30 +27,36 @@ std::optional<double> numberIn(std::string_view text) {
   return value;
 }
 
-// Returns the number of "prefix:name" for any prefix.
-std::optional<double> find(std::string_view xmp, std::string_view name) {
+// Calls accept(value) with the texts of "prefix:name" for any prefix, one after another, until it returns true.
+template <class Accept>
+void visitValues(std::string_view xmp, std::string_view name, const Accept& accept) {
   for (size_t at = xmp.find(name); at != xmp.npos; at = xmp.find(name, at + 1)) {
     if (at == 0 || xmp[at - 1] != ':') continue;
     std::string_view rest = xmp.substr(at + name.size());
     if (!rest.empty() && isNameCharacter(rest[0])) continue;  // a prefix of a longer name
     const size_t sign = rest.find_first_not_of(kBlank);
-    if (sign == rest.npos) return std::nullopt;
+    if (sign == rest.npos) return;
     rest.remove_prefix(sign);
     std::string_view value;
     if (rest[0] == '=') {
       const size_t open = rest.find_first_not_of(kBlank, 1);
       if (open == rest.npos || (rest[open] != '"' && rest[open] != '\'')) continue;
       const size_t close = rest.find(rest[open], open + 1);
-      if (close == rest.npos) return std::nullopt;
+      if (close == rest.npos) return;
       value = rest.substr(open + 1, close - open - 1);
     } else if (rest[0] == '>') {
       value = rest.substr(1, rest.find('<') == rest.npos ? 0 : rest.find('<') - 1);
     } else {
       continue;
     }
-    if (const auto number = numberIn(value)) return number;
+    if (accept(value)) return;
   }
-  return std::nullopt;
+}
+
+std::optional<double> find(std::string_view xmp, std::string_view name) {
+  std::optional<double> number;
+  visitValues(xmp, name, [&number](std::string_view value) { return (number = numberIn(value)).has_value(); });
+  return number;
 }
 
 }  // namespace
@@ -65,6 +71,10 @@ XmpTags decodeXmp(std::string_view xmp) {
   tags.gimbalYaw = find(xmp, "GimbalYawDegree");
   tags.gimbalPitch = find(xmp, "GimbalPitchDegree");
   tags.gimbalRoll = find(xmp, "GimbalRollDegree");
+  visitValues(xmp, "ImageSource", [&tags](std::string_view value) {
+    tags.isInfrared = value.find("Infrared") != value.npos;
+    return true;
+  });
   return tags;
 }
 

@@ -1,0 +1,59 @@
+#include <fmt/format.h>
+
+#include "apps/tessera/verbs.h"
+#include "pipeline/photo_run.h"
+#include "representations/methods.h"
+
+namespace tessera {
+namespace {
+
+bool canBeBaked(const Method& method) {
+  return method.openBaker != nullptr;
+}
+
+std::vector<std::string> bakedMethods() {
+  std::vector<std::string> names;
+  for (const Method* method : methods())
+    if (canBeBaked(*method)) names.emplace_back(method->name);
+  return names;
+}
+
+}  // namespace
+
+void addRunVerb(CLI::App& app) {
+  auto options = std::make_shared<PhotoRunOptions>();
+  options->method = firstMethod(canBeBaked).name;
+  CLI::App* verb = app.add_subcommand("run", "a folder of photos to a scene: poses, training, baking, evaluation");
+  verb->footer(
+      "Run again with the same folders after an interruption: what is finished is kept.\n\n"
+      "Example:\n  tessera run photos/ place --minutes 10");
+  verb->add_option("photos", options->photos, "folder of photos (JPEG, PNG)")->required();
+  verb->add_option("out", options->out, "folder to write")->required();
+  verb->add_option("--method", options->method, "representation")
+      ->capture_default_str()
+      ->check(CLI::IsMember(bakedMethods()));
+  CLI::Option* steps = verb->add_option("--steps", options->steps, "training steps, instead of minutes")
+                           ->check(CLI::Range(int64_t{1}, int64_t{1} << 40));
+  verb->add_option("--minutes", options->minutes, "minutes of training")
+      ->capture_default_str()
+      ->check(CLI::Range(1e-3, 1e7))
+      ->excludes(steps);
+  verb->add_option(
+          "--downscale", options->downscale,
+          fmt::format("divides width and height; 0: until the longer side has at most {} pixels", kLongestSide))
+      ->capture_default_str()
+      ->check(CLI::Range(0, 64));
+  verb->add_option("--holdout", options->holdout, "photos held out for evaluation: every:N, list:FILE or none")
+      ->capture_default_str();
+  verb->add_option("--from", options->range.from, "run this stage and all after it again");
+  verb->add_option("--until", options->range.until, "the last stage to run");
+  verb->add_option("--threads", options->threads, "CPU threads; 0: all cores")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1024));
+  verb->callback([options] {
+    options->program = fs::read_symlink("/proc/self/exe").string();
+    runFromPhotos(*options);
+  });
+}
+
+}  // namespace tessera

@@ -1,0 +1,54 @@
+#include "photogrammetry/colmap_program.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "base/child_process.h"
+#include "base/error.h"
+
+namespace tessera {
+namespace {
+
+constexpr double kSecondsBetweenLooks = 0.5;
+
+}  // namespace
+
+ColmapProgram::ColmapProgram(fs::path log, std::string program) : log_(std::move(log)), program_(std::move(program)) {
+  ChildProcess process;
+  const std::string failure = process.start({program_, "help"});
+  const std::string remedy = fmt::format("install COLMAP {}: apt-get install colmap", kColmapVersion);
+  if (!failure.empty()) throw Error(program_, "", "cannot be run: " + failure, remedy);
+  process.wait();
+  const std::string help = process.lastWords(1 << 16);
+  const size_t at = help.find("COLMAP ");
+  if (at == help.npos) throw Error(program_, "", "does not say that it is COLMAP", remedy);
+  const size_t begin = at + 7;
+  const std::string version = help.substr(begin, help.find_first_of(" \n", begin) - begin);
+  if (version != kColmapVersion) {
+    throw Error(program_, "",
+                fmt::format("is COLMAP {}; only {} has been tested, and others differ in options and files", version,
+                            kColmapVersion),
+                remedy + ", or pose the photos by other means and use `tessera import`");
+  }
+}
+
+void ColmapProgram::run(std::vector<std::string> arguments, const std::function<void()>& watch) {
+  const std::string command = arguments.at(0);
+  arguments.insert(arguments.begin(), program_);
+  ChildProcess process;
+  const std::string failure = process.start(std::move(arguments), {.log = log_});
+  if (!failure.empty()) throw Error(program_, "", "cannot be run: " + failure, "install it again");
+  while (!process.waitFor(kSecondsBetweenLooks)) {
+    if (watch) watch();
+  }
+  const std::string end = process.wait();
+  peakBytes_ = std::max(peakBytes_, process.peakBytes());
+  if (end.empty()) return;
+  const bool killed = end.find("signal 9") != end.npos;
+  throw Error(program_ + " " + command, "", end + (killed ? "" : ": " + process.lastWords(200)),
+              killed ? "if memory ran out, close other programs or use fewer threads; run again to go on"
+                     : "see " + log_.string() + "; run again to go on");
+}
+
+}  // namespace tessera

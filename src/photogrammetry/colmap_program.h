@@ -1,0 +1,33 @@
+// The program `colmap`, which extracts and matches features and estimates poses. It is run as it is installed, never
+// linked. Source: https://colmap.github.io, version 3.8, whose options and files other versions rename or extend.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+
+namespace tessera {
+
+inline constexpr const char* kColmapVersion = "3.8";
+
+class ColmapProgram {
+ public:
+  // `program` is looked up in PATH. Its output is appended to `log`. Throws Error if it cannot be run, or is of another
+  // version than kColmapVersion.
+  explicit ColmapProgram(fs::path log, std::string program = "colmap");
+
+  // Runs a command, such as {"mapper", "--output_path", "sparse"}. `watch` is called now and then while it runs.
+  // Throws Error with its last words if it fails. That it reports success means little: callers look at what it wrote.
+  void run(std::vector<std::string> arguments, const std::function<void()>& watch = {});
+
+  int64_t peakBytes() const { return peakBytes_; }  // of all runs
+
+ private:
+  fs::path log_;
+  std::string program_;
+  int64_t peakBytes_ = 0;
+};
+
+}  // namespace tessera

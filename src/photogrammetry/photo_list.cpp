@@ -1,0 +1,166 @@
+#include "photogrammetry/photo_list.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "base/error.h"
+#include "base/image_io.h"
+
+namespace tessera {
+namespace {
+
+constexpr size_t kHeadBytes = size_t{1} << 20;  // tags and size stand in front of the picture and take fewer bytes
+constexpr double kFullFrameWidth = 36;          // millimetres
+
+struct Header {
+  int width = 0, height = 0;  // 0: unreadable
+  uint64_t fileBytes = 0, hash = 0;
+  PhotoTags tags;
+};
+
+uint64_t contentHash(std::span<const std::byte> bytes) {
+  uint64_t hash = 0xcbf29ce484222325;
+  for (const std::byte value : bytes) hash = (hash ^ std::to_integer<uint64_t>(value)) * 0x100000001b3;
+  return hash;
+}
+
+bool isPhotoName(const fs::path& path) {
+  std::string extension = path.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension == ".jpg" || extension == ".jpeg" || extension == ".png";
+}
+
+std::vector<fs::path> photoFiles(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code status;
+  fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, status), end;
+  if (status) throw Error(folder.string(), "", status.message(), "name a folder of photos");
+  for (; at != end; at.increment(status)) {
+    if (status) throw Error(folder.string(), "", status.message(), "check the disk");
+    const bool isHidden = at->path().filename().string().starts_with(".");
+    std::error_code ignored;
+    if (isHidden && at->is_directory(ignored)) at.disable_recursion_pending();
+    if (!isHidden && isPhotoName(at->path()) && at->is_regular_file(ignored)) files.push_back(at->path());
+  }
+  return files;
+}
+
+Header readHeader(const fs::path& file) {
+  Header header;
+  try {
+    const Bytes head = readFileStart(file, kHeadBytes);
+    std::error_code status;
+    header.fileBytes = fs::file_size(file, status);
+    header.hash = contentHash(head);
+    const auto info = probeImage(head);
+    if (!info || info->format == ImageInfo::Format::exr) return header;
+    header.width = info->width;
+    header.height = info->height;
+    header.tags = decodePhotoTags(head);
+  } catch (const Error&) {
+  }
+  return header;
+}
+
+// Gives each photo a name without folders, blanks and characters that mean something to other programs.
+std::string makeSafe(const std::string& name, std::set<std::string>& used) {
+  std::string safe = name;
+  for (char& c : safe) {
+    if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-' && c != '_') c = '_';
+  }
+  const fs::path path(safe);
+  for (int i = 2; !used.insert(safe).second; ++i)
+    safe = fmt::format("{}_{}{}", path.stem().string(), i, path.extension().string());
+  return safe;
+}
+
+std::string describe(const CameraTags& camera, int width, int height) {
+  std::string name = camera.make;
+  if (!camera.model.empty()) name += (name.empty() ? "" : " ") + camera.model;
+  if (!camera.serial.empty()) name += " " + camera.serial;
+  if (!camera.lens.empty()) name += ", " + camera.lens;
+  return fmt::format("{}, {}x{}", name.empty() ? "unknown camera" : name, width, height);
+}
+
+void findFlights(PhotoList& list) {
+  std::vector<size_t> order(list.photos.size());
+  for (size_t i = 0; i < order.size(); ++i) order[i] = i;
+  const auto folder = [&](size_t i) { return fs::path(list.photos[i].name).parent_path().string(); };
+  const auto group = [&](size_t i) {
+    const ListedPhoto& photo = list.photos[i];
+    return std::tuple(photo.body, photo.tags.takenAt.has_value(), photo.tags.takenAt ? std::string() : folder(i));
+  };
+  std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
+    return std::tuple(group(a), list.photos[a].tags.takenAt.value_or(0)) <
+           std::tuple(group(b), list.photos[b].tags.takenAt.value_or(0));
+  });
+  for (size_t k = 0; k < order.size(); ++k) {
+    const bool continues =
+        k > 0 && group(order[k - 1]) == group(order[k]) &&
+        list.photos[order[k]].tags.takenAt.value_or(0) - list.photos[order[k - 1]].tags.takenAt.value_or(0) <=
+            kPauseBetweenFlights;
+    if (!continues) ++list.flights;
+    list.photos[order[k]].flight = list.flights - 1;
+  }
+}
+
+}  // namespace
+
+double focalLengthInPixels(const CameraTags& camera, int width, int height) {
+  if (camera.focalLength35 > 0) return camera.focalLength35 / kFullFrameWidth * std::max(width, height);
+  // The resolution is that of the full picture: of a reduced one, it would give too long a focal length. The field of
+  // view then is implausible.
+  const double focal = camera.focalLength * camera.pixelsPerMillimetre;
+  const double longSide = std::max(width, height);
+  return focal > 0.3 * longSide && focal < 10 * longSide ? focal : 0;
+}
+
+PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
+  std::vector<fs::path> files = photoFiles(folder);
+  std::sort(files.begin(), files.end(),
+            [](const fs::path& a, const fs::path& b) { return naturalLess(a.string(), b.string()); });
+  std::vector<Header> headers(files.size());
+  pool.run(files.size(), [&](size_t i, int) { headers[i] = readHeader(files[i]); });
+
+  PhotoList list;
+  std::map<std::string, int> bodies;
+  std::map<std::pair<uint64_t, uint64_t>, std::string> seen;
+  std::set<std::string> safeNames;
+  const bool hasVisible = std::any_of(headers.begin(), headers.end(),
+                                      [](const Header& h) { return h.width > 0 && !h.tags.camera.isThermal; });
+  for (size_t i = 0; i < files.size(); ++i) {
+    const Header& header = headers[i];
+    const std::string name = files[i].lexically_relative(folder).generic_string();
+    if (header.width == 0) {
+      list.leftOut.push_back({name, "cannot be read as JPEG or PNG"});
+      continue;
+    }
+    if (header.tags.camera.isThermal && hasVisible) {
+      list.leftOut.push_back({name, "is an infrared picture"});
+      continue;
+    }
+    const auto [first, isNew] = seen.emplace(std::pair(header.fileBytes, header.hash), name);
+    if (!isNew) {
+      list.leftOut.push_back({name, "is a copy of " + first->second});
+      continue;
+    }
+    const CameraTags& camera = header.tags.camera;
+    CameraBody body{describe(camera, header.width, header.height), header.width, header.height,
+                    focalLengthInPixels(camera, header.width, header.height)};
+    const std::string key = fmt::format("{}/{:.3f}", body.name, body.focalLength);
+    const auto [index, isNewBody] = bodies.emplace(key, static_cast<int>(list.bodies.size()));
+    if (isNewBody) list.bodies.push_back(std::move(body));
+    list.photos.push_back({name, makeSafe(name, safeNames), files[i], index->second, 0, header.tags});
+  }
+  findFlights(list);
+  return list;
+}
+
+}  // namespace tessera

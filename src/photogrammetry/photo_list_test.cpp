@@ -1,0 +1,88 @@
+#include "photogrammetry/photo_list.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/image_io.h"
+#include "base/testing/temporary_folder.h"
+#include "photogrammetry/testing/survey_photos.h"
+
+namespace tessera {
+namespace {
+
+class PhotoLists : public testing::Test {
+ protected:
+  PhotoList list() {
+    ThreadPool pool(2);
+    return listPhotos(folder_.path(), pool);
+  }
+  void write(const std::string& name, int shade = 0) {
+    writeJpeg(folder_ / name, ImageU8(8, 6, 3, static_cast<uint8_t>(shade)));
+  }
+  TemporaryFolder folder_;
+};
+
+TEST_F(PhotoLists, NameEachPhotoOnceInNaturalOrder) {
+  write("b/DJI 10.jpg", 1);
+  write("b/DJI 9.jpg", 2);
+  write("a/DJI 9.jpg", 3);
+  write("a_DJI_9.jpg", 4);
+  const PhotoList list = this->list();
+  ASSERT_EQ(list.photos.size(), 4u);
+  EXPECT_EQ(list.photos[0].name, "a/DJI 9.jpg");
+  EXPECT_EQ(list.photos[2].name, "b/DJI 9.jpg");
+  EXPECT_EQ(list.photos[3].name, "b/DJI 10.jpg");
+  EXPECT_EQ(list.photos[0].safeName, "a_DJI_9.jpg");
+  EXPECT_EQ(list.photos[1].safeName, "a_DJI_9_2.jpg") << "another photo has that name";
+}
+
+TEST_F(PhotoLists, LeaveOutWhatIsNoPhotoOrACopy) {
+  write("one.jpg", 1);
+  fs::copy_file(folder_ / "one.jpg", folder_ / "two.jpg");
+  writeFileAtomically(folder_ / "broken.jpg", "no picture");
+  writeFileAtomically(folder_ / "notes.txt", "of the flight");
+  fs::create_directories(folder_ / ".trash");
+  fs::copy_file(folder_ / "one.jpg", folder_ / ".trash/three.jpg");
+  const PhotoList list = this->list();
+  ASSERT_EQ(list.photos.size(), 1u);
+  ASSERT_EQ(list.leftOut.size(), 2u);
+  EXPECT_EQ(list.leftOut[0].name + " " + list.leftOut[0].reason, "broken.jpg cannot be read as JPEG or PNG");
+  EXPECT_EQ(list.leftOut[1].name + " " + list.leftOut[1].reason, "two.jpg is a copy of one.jpg");
+}
+
+TEST_F(PhotoLists, TellSizesApartAsCameras) {
+  writeJpeg(folder_ / "a.jpg", ImageU8(8, 6, 3));
+  writeJpeg(folder_ / "b.jpg", ImageU8(6, 8, 3));
+  const PhotoList list = this->list();
+  ASSERT_EQ(list.bodies.size(), 2u);
+  EXPECT_EQ(list.bodies[0].name, "unknown camera, 8x6");
+  EXPECT_EQ(list.bodies[0].focalLength, 0);
+}
+
+TEST_F(PhotoLists, SeparateFlightsByPauses) {
+  for (int i = 0; i < 6; ++i)
+    writeSurveyPhoto(folder_ / ("p" + std::to_string(i) + ".jpg"), {.seconds = i * 3.0 + (i >= 4 ? 400 : 0)});
+  const PhotoList list = this->list();
+  ASSERT_EQ(list.photos.size(), 6u);
+  EXPECT_EQ(list.flights, 2);
+  EXPECT_EQ(list.photos[3].flight, 0);
+  EXPECT_EQ(list.photos[4].flight, 1);
+  EXPECT_EQ(list.bodies.size(), 1u);
+  EXPECT_NEAR(list.bodies[0].focalLength, 28.0 / 36 * 8, 1e-9);
+}
+
+TEST_F(PhotoLists, RefuseAFolderThatIsNotThere) {
+  ThreadPool pool(1);
+  EXPECT_THROW(listPhotos(folder_ / "none", pool), Error);
+}
+
+TEST(FocalLengths, FollowFromTheFieldOfViewOrTheSensor) {
+  EXPECT_NEAR(focalLengthInPixels({.focalLength35 = 24}, 4000, 3000), 24.0 / 36 * 4000, 1e-9);
+  EXPECT_NEAR(focalLengthInPixels({.focalLength35 = 24}, 3000, 4000), 24.0 / 36 * 4000, 1e-9);
+  EXPECT_NEAR(focalLengthInPixels({.focalLength = 8.8, .pixelsPerMillimetre = 416}, 5472, 3648), 8.8 * 416, 1e-9);
+  EXPECT_EQ(focalLengthInPixels({.focalLength = 8.8, .pixelsPerMillimetre = 41600}, 5472, 3648), 0) << "implausible";
+  EXPECT_EQ(focalLengthInPixels({}, 5472, 3648), 0);
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,200 @@
+#include "photogrammetry/photo_pairs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <numeric>
+#include <set>
+
+#include "import/georeference.h"
+
+namespace tessera {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180;
+constexpr int kSamples = 7;                              // of a footprint, along each side
+constexpr double kUnknownFocal = 0.8;                    // of the longer side, as in most drones
+constexpr double kLeastHeight = 5, kUnknownHeight = 80;  // metres
+// Footprints end where rays are so near the horizon that they go farther than this many heights.
+constexpr double kFarthestHeights = 6;
+
+// What a photo shows of the ground, taken as a plane below the flight.
+struct Footprint {
+  int photo = 0;
+  Vec3d eye = Vec3d::Zero();  // metres east, north and up; the ground is at 0
+  Mat3d worldFromCamera = Mat3d::Identity();
+  double slopeX = 0, slopeY = 0;  // half the picture over the focal length
+  std::vector<Vec2d> places;      // of a grid of pixels
+  Vec2d middle = Vec2d::Zero();
+  double radius = 0;
+
+  bool shows(const Vec2d& place) const {
+    const Vec3d inCamera = worldFromCamera.transpose() * (Vec3d(place.x(), place.y(), 0) - eye);
+    return inCamera.z() > 0 && std::abs(inCamera.x()) <= slopeX * inCamera.z() &&
+           std::abs(inCamera.y()) <= slopeY * inCamera.z();
+  }
+};
+
+// Gimbal angles: yaw clockwise from north, pitch above the horizon, roll about the optical axis.
+Mat3d rotationFromGimbal(const GimbalAngles& gimbal) {
+  const double yaw = gimbal.yaw * kDegree, pitch = gimbal.pitch * kDegree;
+  const Vec3d level(std::sin(yaw), std::cos(yaw), 0);
+  const Vec3d forward = std::cos(pitch) * level + std::sin(pitch) * Vec3d::UnitZ();
+  const Vec3d right(level.y(), -level.x(), 0);
+  Mat3d rotation;
+  rotation << right, forward.cross(right), forward;
+  return rotation * Eigen::AngleAxisd(gimbal.roll * kDegree, Vec3d::UnitZ()).toRotationMatrix();
+}
+
+Footprint makeFootprint(const PhotoList& list, int photo, const Vec3d& eye) {
+  const ListedPhoto& p = list.photos[static_cast<size_t>(photo)];
+  const CameraBody& body = list.bodies[static_cast<size_t>(p.body)];
+  Footprint print;
+  print.photo = photo;
+  print.eye = eye;
+  print.worldFromCamera = rotationFromGimbal(p.tags.gimbal.value_or(GimbalAngles{0, -90, 0}));
+  const double focal = body.focalLength > 0 ? body.focalLength : kUnknownFocal * std::max(body.width, body.height);
+  print.slopeX = 0.5 * body.width / focal;
+  print.slopeY = 0.5 * body.height / focal;
+  // Nothing says how a photo without gimbal angles is turned about the vertical: its footprint is a square.
+  if (!p.tags.gimbal) print.slopeX = print.slopeY = std::sqrt(print.slopeX * print.slopeY);
+  for (int j = 0; j < kSamples; ++j) {
+    for (int i = 0; i < kSamples; ++i) {
+      const double x = (2 * i + 1.0) / kSamples - 1, y = (2 * j + 1.0) / kSamples - 1;
+      const Vec3d ray = print.worldFromCamera * Vec3d(x * print.slopeX, y * print.slopeY, 1);
+      if (!(ray.z() < 0)) continue;
+      const double distance = -eye.z() / ray.z();
+      if (distance * ray.head<2>().norm() > kFarthestHeights * eye.z()) continue;
+      print.places.emplace_back(eye.head<2>() + distance * ray.head<2>());
+    }
+  }
+  for (const Vec2d& place : print.places) print.middle += place / static_cast<double>(print.places.size());
+  for (const Vec2d& place : print.places) print.radius = std::max(print.radius, (place - print.middle).norm());
+  return print;
+}
+
+std::vector<Footprint> footprints(const PhotoList& list) {
+  GeoFrame frame;
+  int fixes = 0;
+  for (const ListedPhoto& photo : list.photos) fixes += photo.tags.gps ? 1 : 0;
+  for (const ListedPhoto& photo : list.photos) {
+    if (!photo.tags.gps) continue;
+    frame.latitude += photo.tags.gps->latitude / fixes;
+    frame.longitude += photo.tags.gps->longitude / fixes;
+  }
+  std::vector<Footprint> prints;
+  for (size_t i = 0; i < list.photos.size(); ++i) {
+    const auto& gps = list.photos[i].tags.gps;
+    if (!gps) continue;
+    Vec3d eye = enuFromGps(frame, gps->latitude, gps->longitude, 0);
+    eye.z() = gps->relativeAltitude > kLeastHeight ? gps->relativeAltitude : kUnknownHeight;
+    prints.push_back(makeFootprint(list, static_cast<int>(i), eye));
+  }
+  return prints;
+}
+
+double sharedShare(const Footprint& a, const Footprint& b) {
+  if ((a.middle - b.middle).norm() > a.radius + b.radius) return 0;
+  const auto shared = [](const Footprint& of, const Footprint& in) {
+    const auto n = std::count_if(of.places.begin(), of.places.end(), [&](const Vec2d& x) { return in.shows(x); });
+    return of.places.empty() ? 0 : static_cast<double>(n) / static_cast<double>(of.places.size());
+  };
+  // The mean: a photo from high above holds all of a lower one's footprint, which fills little of it.
+  return 0.5 * (shared(a, b) + shared(b, a));
+}
+
+PhotoPair inOrder(int a, int b) {
+  return {std::min(a, b), std::max(a, b)};
+}
+
+void pairInSequence(const PhotoList& list, int neighbours, std::set<PhotoPair>& pairs) {
+  std::map<int, std::vector<int>> flights;
+  for (size_t i = 0; i < list.photos.size(); ++i) flights[list.photos[i].flight].push_back(static_cast<int>(i));
+  for (auto& [flight, photos] : flights) {
+    std::stable_sort(photos.begin(), photos.end(), [&](int a, int b) {
+      return list.photos[static_cast<size_t>(a)].tags.takenAt.value_or(0) <
+             list.photos[static_cast<size_t>(b)].tags.takenAt.value_or(0);
+    });
+    for (size_t i = 0; i < photos.size(); ++i) {
+      for (size_t k = i + 1; k < photos.size() && k <= i + static_cast<size_t>(neighbours); ++k)
+        pairs.insert(inOrder(photos[i], photos[k]));
+    }
+  }
+}
+
+struct Candidate {
+  double overlap;
+  int a, b;  // indices into the footprints
+};
+
+void pairByFootprint(const PhotoList& list, const PairOptions& options, std::set<PhotoPair>& pairs) {
+  const std::vector<Footprint> prints = footprints(list);
+  std::vector<std::vector<Candidate>> candidates(prints.size());
+  std::vector<Candidate> all;
+  for (size_t a = 0; a < prints.size(); ++a) {
+    for (size_t b = a + 1; b < prints.size(); ++b) {
+      const double overlap = sharedShare(prints[a], prints[b]);
+      if (overlap <= 0) continue;
+      const Candidate candidate{overlap, static_cast<int>(a), static_cast<int>(b)};
+      all.push_back(candidate);
+      const double cosine = prints[a].worldFromCamera.col(2).dot(prints[b].worldFromCamera.col(2));
+      if (overlap < options.minOverlap || cosine < std::cos(options.maxAngle * kDegree)) continue;
+      candidates[a].push_back(candidate);
+      candidates[b].push_back(candidate);
+    }
+  }
+  const auto byOverlap = [](const Candidate& x, const Candidate& y) {
+    return std::tuple(-x.overlap, x.a, x.b) < std::tuple(-y.overlap, y.a, y.b);
+  };
+  const auto photo = [&](int print) { return prints[static_cast<size_t>(print)].photo; };
+  for (size_t i = 0; i < prints.size(); ++i) {
+    std::sort(candidates[i].begin(), candidates[i].end(), byOverlap);
+    std::map<int, int> taken;  // by flight
+    int count = 0;
+    const int own = list.photos[static_cast<size_t>(prints[i].photo)].flight;
+    for (const Candidate& candidate : candidates[i]) {
+      const int other = candidate.a == static_cast<int>(i) ? candidate.b : candidate.a;
+      const int flight = list.photos[static_cast<size_t>(photo(other))].flight;
+      const bool isBest = count++ < options.partners;
+      if (!isBest && (flight == own || taken[flight] >= options.otherFlight)) continue;
+      ++taken[flight];
+      pairs.insert(inOrder(prints[i].photo, photo(other)));
+    }
+  }
+  // A spanning tree by overlap, whatever the angles, so that no photo stands alone.
+  std::sort(all.begin(), all.end(), byOverlap);
+  std::vector<int> root(prints.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&root](int i) {
+    while (root[static_cast<size_t>(i)] != i)
+      i = root[static_cast<size_t>(i)] = root[static_cast<size_t>(root[static_cast<size_t>(i)])];
+    return i;
+  };
+  for (const Candidate& candidate : all) {
+    const int a = find(candidate.a), b = find(candidate.b);
+    if (a == b) continue;
+    root[static_cast<size_t>(a)] = b;
+    pairs.insert(inOrder(photo(candidate.a), photo(candidate.b)));
+  }
+}
+
+}  // namespace
+
+std::vector<PhotoPair> choosePairs(const PhotoList& list, const PairOptions& options) {
+  std::set<PhotoPair> pairs;
+  const int count = static_cast<int>(list.photos.size());
+  if (count <= options.all) {
+    for (int a = 0; a < count; ++a)
+      for (int b = a + 1; b < count; ++b) pairs.emplace(a, b);
+    return {pairs.begin(), pairs.end()};
+  }
+  const auto fixes = std::count_if(list.photos.begin(), list.photos.end(),
+                                   [](const ListedPhoto& photo) { return photo.tags.gps.has_value(); });
+  const bool hasGps = 2 * fixes >= count;
+  pairInSequence(list, hasGps ? options.neighbours : options.sequence, pairs);
+  if (hasGps) pairByFootprint(list, options, pairs);
+  return {pairs.begin(), pairs.end()};
+}
+
+}  // namespace tessera

@@ -1,0 +1,28 @@
+// Which pairs of photos are compared in structure from motion. All pairs are a quadratic number; GPS, the gimbal and
+// the sequence of a flight tell which can show the same places.
+#pragma once
+
+#include <utility>
+#include <vector>
+
+#include "photogrammetry/photo_list.h"
+
+namespace tessera {
+
+using PhotoPair = std::pair<int, int>;  // indices into PhotoList::photos, the smaller one first
+
+struct PairOptions {
+  int all = 40;             // up to so many photos, all pairs
+  int partners = 15;        // with how many others a photo is paired by overlap
+  int otherFlight = 4;      // with how many photos of each other flight that overlaps, at least
+  int neighbours = 2;       // in the sequence of a flight, to each side
+  int sequence = 10;        // neighbours to each side if there is no GPS
+  double minOverlap = 0.2;  // share of a photo's pixels
+  double maxAngle = 50;     // degrees between the optical axes
+};
+
+// Returns the pairs, sorted. With GPS, footprints on the ground decide, for photos without gimbal angles as if they
+// looked straight down; all photos with GPS are connected.
+std::vector<PhotoPair> choosePairs(const PhotoList& list, const PairOptions& options = {});
+
+}  // namespace tessera

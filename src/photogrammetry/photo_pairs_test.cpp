@@ -1,0 +1,111 @@
+#include "photogrammetry/photo_pairs.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+namespace tessera {
+namespace {
+
+constexpr double kMetresPerDegree = 111320;
+
+// A photo of a survey near the equator, where a degree of longitude is as long as one of latitude.
+ListedPhoto photoAt(double east, double north, double height, const GimbalAngles& gimbal, int flight, double seconds) {
+  ListedPhoto photo;
+  photo.flight = flight;
+  photo.tags.gps = GpsFix{north / kMetresPerDegree, east / kMetresPerDegree, 100 + height, height};
+  photo.tags.gimbal = gimbal;
+  photo.tags.takenAt = seconds;
+  return photo;
+}
+
+// Lines from west to east, `step` metres apart, at 60 m with a picture of about 76 × 57 m on the ground.
+PhotoList survey(int lines, int perLine, double step) {
+  PhotoList list;
+  list.bodies = {{"camera", 800, 600, 628}};
+  for (int row = 0; row < lines; ++row) {
+    for (int k = 0; k < perLine; ++k) {
+      const int column = row % 2 == 0 ? k : perLine - 1 - k;
+      list.photos.push_back(photoAt(column * step, row * step, 60, {90, -90, 0}, 0, 3.0 * (row * perLine + k)));
+    }
+  }
+  list.flights = 1;
+  return list;
+}
+
+int groups(const PhotoList& list, const std::vector<PhotoPair>& pairs) {
+  std::vector<int> group(list.photos.size());
+  std::iota(group.begin(), group.end(), 0);
+  for (bool changed = true; changed;) {
+    changed = false;
+    for (const auto& [a, b] : pairs) {
+      int &x = group[static_cast<size_t>(a)], &y = group[static_cast<size_t>(b)];
+      changed = changed || x != y;
+      x = y = std::min(x, y);
+    }
+  }
+  return static_cast<int>(std::set<int>(group.begin(), group.end()).size());
+}
+
+TEST(PhotoPairs, AreAllOfAFewPhotos) {
+  EXPECT_EQ(choosePairs(survey(4, 5, 15)).size(), 20u * 19 / 2);
+}
+
+TEST(PhotoPairs, AreThoseThatOverlap) {
+  const PhotoList list = survey(12, 12, 15);
+  const std::vector<PhotoPair> pairs = choosePairs(list);
+  EXPECT_LE(pairs.size(), 144u * 16);
+  EXPECT_GE(pairs.size(), 144u * 5);
+  EXPECT_EQ(groups(list, pairs), 1);
+  for (const auto& [a, b] : pairs) {
+    EXPECT_LT(a, b);
+    const GpsFix &x = *list.photos[static_cast<size_t>(a)].tags.gps, &y = *list.photos[static_cast<size_t>(b)].tags.gps;
+    const double apart = std::hypot(x.latitude - y.latitude, x.longitude - y.longitude) * kMetresPerDegree;
+    EXPECT_LT(apart, 65) << a << " " << b;
+  }
+  EXPECT_TRUE(std::is_sorted(pairs.begin(), pairs.end()));
+  // Neighbours of another line, which the sequence alone does not connect.
+  EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(), PhotoPair(6, 17)));
+}
+
+TEST(PhotoPairs, ConnectFlightsOfOtherHeightsAndAngles) {
+  PhotoList list = survey(7, 7, 15);
+  for (int k = 0; k < 7; ++k) {
+    // Twice as high; and oblique ones that look north at the same places from the south.
+    list.photos.push_back(photoAt(15.0 * k, 45, 120, {0, -90, 0}, 1, 1000 + 3 * k));
+    list.photos.push_back(photoAt(15.0 * k, -5, 60, {0, -50, 0}, 2, 2000 + 3 * k));
+  }
+  const std::vector<PhotoPair> pairs = choosePairs(list);
+  EXPECT_EQ(groups(list, pairs), 1);
+  for (size_t i = 49; i < list.photos.size(); ++i) {
+    const int own = list.photos[i].flight;
+    const auto others = std::count_if(pairs.begin(), pairs.end(), [&](const PhotoPair& pair) {
+      const auto a = static_cast<size_t>(pair.first), b = static_cast<size_t>(pair.second);
+      return (a == i && list.photos[b].flight != own) || (b == i && list.photos[a].flight != own);
+    });
+    EXPECT_GE(others, 4) << i;
+  }
+}
+
+TEST(PhotoPairs, AreNotMadeOfPhotosThatLookAway) {
+  PhotoList list = survey(7, 7, 15);
+  // In the middle of the survey, but the ground that it shows is far to the north.
+  list.photos.push_back(photoAt(45, 45, 60, {0, -15, 0}, 1, 1000));
+  int partners = 0;
+  for (const auto& [a, b] : choosePairs(list)) partners += b == 49 ? 1 : 0;
+  EXPECT_LE(partners, 1) << "only what the spanning tree needs";
+}
+
+TEST(PhotoPairs, FollowTheSequenceWithoutGps) {
+  PhotoList list = survey(7, 7, 15);
+  for (ListedPhoto& photo : list.photos) photo.tags.gps.reset();
+  const std::vector<PhotoPair> pairs = choosePairs(list);
+  EXPECT_EQ(pairs.size(), 49u * 10 - 55);
+  for (const auto& [a, b] : pairs) EXPECT_LE(b - a, 10);
+}
+
+}  // namespace
+}  // namespace tessera

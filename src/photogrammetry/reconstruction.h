@@ -1,0 +1,49 @@
+// Poses of photos by structure from motion: a folder with the photos under safe names, COLMAP's database and models.
+// Each step goes on where it was interrupted.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "import/source.h"
+#include "photogrammetry/photo_list.h"
+#include "photogrammetry/photo_pairs.h"
+
+namespace tessera {
+
+struct ReconstructionOptions {
+  int threads = 0;  // 0: all
+  std::string colmap = "colmap";
+};
+
+class Reconstruction {
+ public:
+  // `folder` is created if it does not exist. `list` must outlive this object. Throws Error if colmap cannot be used.
+  Reconstruction(fs::path folder, const PhotoList& list, ReconstructionOptions options);
+
+  // Called now and then with the number of photos or pairs that are done.
+  using Watch = std::function<void(int64_t done)>;
+
+  void extractFeatures(const Watch& watch);
+  // Compares pairs that have not been compared yet.
+  void match(const std::vector<PhotoPair>& pairs, const Watch& watch);
+  size_t linkedPairs() const;  // of those compared, the pairs that one geometry explains
+  // Estimates poses. Throws Error if no model results.
+  void map(const Watch& watch);
+  // Returns the largest model, with photos under their own names.
+  SourceCapture largestModel() const;
+
+  int64_t peakBytes() const { return peakBytes_; }  // of the programs that it ran
+
+ private:
+  void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
+  std::string threads() const;
+
+  fs::path folder_;
+  const PhotoList& list_;
+  ReconstructionOptions options_;
+  int64_t peakBytes_ = 0;
+};
+
+}  // namespace tessera

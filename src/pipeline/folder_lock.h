@@ -1,0 +1,19 @@
+// A folder that one process at a time works in.
+#pragma once
+
+#include "base/child_process.h"
+#include "base/file.h"
+
+namespace tessera {
+
+// Held until destruction, or until the process ends, however it does.
+class FolderLock {
+ public:
+  // Creates the folder if it does not exist. Throws Error if another process holds it.
+  explicit FolderLock(const fs::path& folder);
+
+ private:
+  Descriptor file_;
+};
+
+}  // namespace tessera

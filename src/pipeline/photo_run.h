@@ -1,0 +1,36 @@
+// From a folder of photos to a scene: the stages of `tessera run`.
+//
+//   inspect   which photos can be used; cameras, flights             run.json
+//   features  COLMAP's features                                      poses/database.db
+//   pairs     which photos are compared                              poses/pairs.json
+//   matches   COLMAP's matches of these pairs                        poses/database.db
+//   mapping   COLMAP's models                                        poses/sparse
+//   capture   the largest model, with a georeference                 capture/
+//   train, bake, evaluate   this program's verbs, as processes       model/, scene/, report.html, eval.json
+#pragma once
+
+#include <string>
+
+#include "base/file.h"
+#include "pipeline/stage.h"
+
+namespace tessera {
+
+struct PhotoRunOptions {
+  fs::path photos, out;
+  std::string method;
+  double minutes = 10;  // of training
+  int64_t steps = 0;    // instead of minutes, if above 0
+  int downscale = 0;    // 0: so that the longer side has at most kLongestSide pixels
+  std::string holdout = "every:8";
+  int threads = 0;      // 0: all
+  std::string program;  // this program, which trains, bakes and evaluates
+  StageRange range;
+};
+
+inline constexpr int kLongestSide = 1600;  // pixels
+
+// Runs what is not finished. Throws Error naming what cannot go on; what was done so far is kept.
+void runFromPhotos(const PhotoRunOptions& options);
+
+}  // namespace tessera

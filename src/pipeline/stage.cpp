@@ -1,0 +1,118 @@
+#include "pipeline/stage.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/memory.h"
+
+namespace tessera {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Finished {
+  std::string digest, summary;
+  double seconds = 0;
+  int64_t peakBytes = 0;
+};
+
+// What run.json of an earlier run says of a stage; nothing if the file is missing or damaged: then all is run again.
+std::vector<std::pair<std::string, Finished>> readFinished(const fs::path& file) {
+  std::vector<std::pair<std::string, Finished>> finished;
+  constexpr uint64_t kMaxBytes = 1 << 20;
+  std::error_code status;
+  if (!fs::exists(file, status)) return finished;
+  const Json run = Json::parse(readTextFile(file, kMaxBytes), nullptr, false);
+  if (!run.is_object() || !run.contains("stages") || !run["stages"].is_array()) return finished;
+  for (const Json& stage : run["stages"]) {
+    if (!stage.is_object() || !stage.contains("name") || !stage["name"].is_string()) continue;
+    Finished entry;
+    const auto text = [&](const char* key) {
+      return stage.contains(key) && stage[key].is_string() ? stage[key].get<std::string>() : std::string();
+    };
+    const auto number = [&](const char* key) {
+      return stage.contains(key) && stage[key].is_number() ? stage[key].get<double>() : 0.0;
+    };
+    entry.digest = text("digest");
+    entry.summary = text("summary");
+    entry.seconds = number("seconds");
+    entry.peakBytes = static_cast<int64_t>(number("peak_bytes"));
+    finished.emplace_back(stage["name"].get<std::string>(), entry);
+  }
+  return finished;
+}
+
+Json toJson(const std::string& name, const Finished& result) {
+  return {{"name", name},
+          {"digest", result.digest},
+          {"seconds", result.seconds},
+          {"peak_bytes", result.peakBytes},
+          {"summary", result.summary}};
+}
+
+std::string describeSeconds(double seconds) {
+  const auto whole = static_cast<int64_t>(seconds + 0.5);
+  return fmt::format("{}:{:02}", whole / 60, whole % 60);
+}
+
+void requireStage(const std::vector<Stage>& stages, const std::string& name, const char* flag) {
+  if (name.empty()) return;
+  std::string names;
+  for (const Stage& stage : stages) {
+    if (stage.name == name) return;
+    names += (names.empty() ? "" : ", ") + stage.name;
+  }
+  throw Error(fmt::format("{} {}", flag, name), "", "there is no such stage", "name one of " + names);
+}
+
+}  // namespace
+
+std::string textDigest(const std::string& text) {
+  uint64_t hash = 0xcbf29ce484222325;
+  for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
+  return fmt::format("{:016x}", hash);
+}
+
+void runStages(const fs::path& folder, const std::string& request, const std::vector<Stage>& stages,
+               const StageRange& range) {
+  requireStage(stages, range.from, "--from");
+  requireStage(stages, range.until, "--until");
+  const fs::path file = folder / "run.json";
+  const auto before = readFinished(file);
+  Json run = {{"version", 1}, {"request", request}, {"stages", Json::array()}};
+  std::string digest;
+  bool again = false;
+  for (const Stage& stage : stages) {
+    digest = textDigest(digest + "\n" + stage.name + "\n" + stage.settings);
+    again = again || stage.name == range.from;
+    const auto known =
+        std::find_if(before.begin(), before.end(), [&](const auto& entry) { return entry.first == stage.name; });
+    Finished result;
+    if (!again && known != before.end() && known->second.digest == digest && stage.isComplete()) {
+      result = known->second;
+      fmt::print("{:<10} finished before: {}\n", stage.name, result.summary);
+    } else {
+      // Results of later stages end with those of this one, also if it is interrupted.
+      again = true;
+      writeFileAtomically(file, run.dump(2) + "\n", true);
+      const auto start = std::chrono::steady_clock::now();
+      const StageOutcome outcome = stage.run();
+      result.digest = digest;
+      result.summary = outcome.summary;
+      result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      result.peakBytes = std::max(outcome.peakBytes, residentBytes());
+      fmt::print("{:<10} {}: {}\n", stage.name, describeSeconds(result.seconds), result.summary);
+    }
+    std::fflush(stdout);
+    run["stages"].push_back(toJson(stage.name, result));
+    if (again) writeFileAtomically(file, run.dump(2) + "\n", true);
+    if (stage.name == range.until) break;
+  }
+}
+
+}  // namespace tessera

@@ -1,0 +1,39 @@
+// A sequence of stages, each of which turns files into files. What is finished is not repeated: run.json records for
+// each stage a digest of everything that its result depends on.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "base/file.h"
+
+namespace tessera {
+
+struct StageOutcome {
+  int64_t peakBytes = 0;  // of memory, of the programs that the stage ran; 0: it ran none
+  std::string summary;    // what it achieved, for the line that is printed
+};
+
+struct Stage {
+  std::string name;
+  std::string settings;  // what its result depends on, besides the results of earlier stages
+  std::function<bool()> isComplete = [] { return true; };  // whether what it wrote is still there
+  std::function<StageOutcome()> run;
+};
+
+struct StageRange {
+  std::string from;   // run again from this stage on, even if it is finished; empty: what is not finished
+  std::string until;  // the last stage to run; empty: all
+};
+
+// Runs the stages in order, and prints a line for each on stdout. `request` describes the run in run.json. Throws Error
+// if a stage of `range` does not exist, and what a stage throws.
+void runStages(const fs::path& folder, const std::string& request, const std::vector<Stage>& stages,
+               const StageRange& range);
+
+// Returns a digest of a text, 16 hexadecimal digits.
+std::string textDigest(const std::string& text);
+
+}  // namespace tessera

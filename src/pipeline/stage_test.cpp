@@ -1,0 +1,93 @@
+#include "pipeline/stage.h"
+
+#include <gtest/gtest.h>
+
+#include "base/error.h"
+#include "base/testing/temporary_folder.h"
+
+namespace tessera {
+namespace {
+
+class Stages : public testing::Test {
+ protected:
+  // Runs three stages with these settings, and returns the names of those that had to be run.
+  std::string run(const std::vector<std::string>& settings, const StageRange& range = {}) {
+    std::string ran;
+    std::vector<Stage> stages;
+    const char* names[] = {"one", "two", "three"};
+    for (size_t i = 0; i < 3; ++i) {
+      const std::string name = names[i];
+      stages.push_back({.name = name,
+                        .settings = settings[i],
+                        .isComplete = [this, name] { return name != lost_; },
+                        .run =
+                            [this, &ran, name] {
+                              if (name == failing_) throw Error(name, "", "fails", "repair it");
+                              ran += name + " ";
+                              return StageOutcome{0, "done"};
+                            }});
+    }
+    try {
+      runStages(folder_.path(), "test", stages, range);
+    } catch (const Error&) {
+      ran += "failed";
+    }
+    return ran;
+  }
+
+  TemporaryFolder folder_;
+  std::string lost_, failing_;
+};
+
+TEST_F(Stages, AreNotRepeated) {
+  EXPECT_EQ(run({"", "", ""}), "one two three ");
+  EXPECT_EQ(run({"", "", ""}), "");
+}
+
+TEST_F(Stages, AreRepeatedFromTheFirstOneWhoseSettingsChange) {
+  run({"a", "b", "c"});
+  EXPECT_EQ(run({"a", "x", "c"}), "two three ");
+  EXPECT_EQ(run({"y", "x", "c"}), "one two three ");
+}
+
+TEST_F(Stages, AreRepeatedFromTheFirstOneWhoseFilesAreLost) {
+  run({"", "", ""});
+  lost_ = "three";
+  EXPECT_EQ(run({"", "", ""}), "three ");
+  lost_ = "one";
+  EXPECT_EQ(run({"", "", ""}), "one two three ");
+}
+
+TEST_F(Stages, GoOnAfterAFailure) {
+  failing_ = "two";
+  EXPECT_EQ(run({"", "", ""}), "one failed");
+  failing_.clear();
+  EXPECT_EQ(run({"", "", ""}), "two three ");
+}
+
+TEST_F(Stages, ForgetWhatFollowsAStageThatIsInterrupted) {
+  run({"", "", ""});
+  failing_ = "two";
+  EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "failed");
+  failing_.clear();
+  EXPECT_EQ(run({"", "", ""}), "two three ") << "what the second made may have changed";
+}
+
+TEST_F(Stages, RunInTheRangeAskedFor) {
+  EXPECT_EQ(run({"", "", ""}, {.until = "two"}), "one two ");
+  EXPECT_EQ(run({"", "", ""}, {.until = "one"}), "");
+  EXPECT_EQ(run({"", "", ""}), "three ") << "what lies behind the range is kept";
+  EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "two three ");
+  EXPECT_EQ(run({"", "", ""}, {.from = "four"}), "failed");
+}
+
+TEST_F(Stages, SurviveADamagedRecord) {
+  run({"", "", ""});
+  for (const char* text : {"", "{", "[]", "{\"stages\": 3}", "{\"stages\": [1, {\"name\": 2}, {\"name\": \"one\"}]}"}) {
+    writeFileAtomically(folder_ / "run.json", text);
+    EXPECT_EQ(run({"", "", ""}), "one two three ") << text;
+  }
+}
+
+}  // namespace
+}  // namespace tessera
