@@ -5,7 +5,7 @@
 set -euo pipefail
 cd "$(dirname "$0")"
 preset=${1:-release}
-tools/install-debian-packages.sh --browser
+tools/install-debian-packages.sh --browser --colmap
 tools/build.sh "$preset"
 ctest --preset "$preset" --parallel "$(nproc)" --output-on-failure
 tools/build-web.sh

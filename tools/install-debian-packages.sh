@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Installs what building and testing tessera needs on Debian 12. Run as root or with sudo. Does nothing if everything is installed.
-#   tools/install-debian-packages.sh [--browser] [--fuzz] [--bench]
+#   tools/install-debian-packages.sh [--browser] [--colmap] [--fuzz] [--bench]
 set -euo pipefail
 
 packages=(
@@ -19,9 +19,10 @@ command -v npm > /dev/null || packages+=(nodejs npm)
 for argument in "$@"; do
   case "$argument" in
     --browser) packages+=(chromium xvfb xauth) ;;
+    --colmap) packages+=(colmap) ;;
     --fuzz) packages+=(clang-14 libclang-rt-14-dev) ;;
     --bench) packages+=(jq python3 libtorch-dev libopenblas0-pthread vulkan-tools) ;;
-    *) echo "usage: $0 [--browser] [--fuzz] [--bench]" >&2; exit 2 ;;
+    *) echo "usage: $0 [--browser] [--colmap] [--fuzz] [--bench]" >&2; exit 2 ;;
   esac
 done
 

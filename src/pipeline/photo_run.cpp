@@ -1,7 +1,6 @@
 #include "pipeline/photo_run.h"
 
 #include <fmt/format.h>
-#include <fmt/std.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
@@ -40,27 +39,39 @@ class PhotoRun {
     const std::string training =
         options_.steps > 0 ? fmt::format("--steps {}", options_.steps) : fmt::format("--minutes {}", options_.minutes);
     return {
-        {.name = "inspect", .settings = describePhotos(), .run = [this] { return inspect(); }},
+        {.name = "inspect", .settings = describePhotos(), .run = [this](bool) { return inspect(); }},
         {.name = "features",
          .settings = "",
          .isComplete = has("poses/database.db"),
-         .run = [this] { return features(); }},
-        {.name = "pairs", .settings = "", .isComplete = has("poses/pairs.json"), .run = [this] { return pairs(); }},
+         .run = [this](bool resumes) { return features(resumes); }},
+        {.name = "pairs",
+         .settings = "",
+         .isComplete = has("poses/pairs.json"),
+         .run = [this](bool) { return pairs(); }},
         {.name = "matches",
          .settings = "",
          .isComplete = has("poses/database.db"),
-         .run = [this] { return matches(); }},
-        {.name = "mapping", .settings = "", .isComplete = has("poses/sparse"), .run = [this] { return mapping(); }},
+         .run = [this](bool) { return matches(); }},
+        {.name = "mapping",
+         .settings = "",
+         .isComplete = has("poses/sparse"),
+         .run = [this](bool) { return mapping(); }},
         {.name = "capture",
          .settings = fmt::format("{} {}", downscale(), options_.holdout),
          .isComplete = has("capture/transforms.json"),
-         .run = [this] { return capture(); }},
+         .run = [this](bool) { return capture(); }},
         {.name = "train",
          .settings = fmt::format("--method {} {}", options_.method, training),
          .isComplete = has("model/manifest.json"),
-         .run = [this] { return train(); }},
-        {.name = "bake", .settings = "", .isComplete = has("scene/tileset.json"), .run = [this] { return bake(); }},
-        {.name = "evaluate", .settings = "", .isComplete = has("eval.json"), .run = [this] { return evaluate(); }},
+         .run = [this](bool resumes) { return train(resumes); }},
+        {.name = "bake",
+         .settings = "",
+         .isComplete = has("scene/tileset.json"),
+         .run = [this](bool) { return bake(); }},
+        {.name = "evaluate",
+         .settings = "",
+         .isComplete = has("eval.json"),
+         .run = [this](bool) { return evaluate(); }},
     };
   }
 
@@ -83,18 +94,18 @@ class PhotoRun {
     return textDigest(text);
   }
 
-  // Another set of photos needs other poses: what was estimated for the previous one is removed.
   StageOutcome inspect() {
-    std::error_code status;
-    for (const char* name : {"poses/database.db", "poses/database.db-wal", "poses/database.db-shm", "poses/pairs.json"})
-      fs::remove(out(name), status);
     size_t withGps = 0;
     for (const ListedPhoto& photo : list_.photos) withGps += photo.tags.gps ? 1 : 0;
     return {0, fmt::format("{} photos, {} with GPS, {} left out; {} cameras, {} flights", list_.photos.size(), withGps,
                            list_.leftOut.size(), list_.bodies.size(), list_.flights)};
   }
 
-  StageOutcome features() {
+  StageOutcome features(bool resumes) {
+    std::error_code status;
+    if (!resumes)
+      for (const char* name : {"poses/database.db", "poses/database.db-wal", "poses/database.db-shm"})
+        fs::remove(out(name), status);
     Progress progress("features", static_cast<int64_t>(list_.photos.size()), "photos");
     reconstruction_->extractFeatures([&](int64_t done) { progress.update(done); });
     return {reconstruction_->peakBytes(), fmt::format("{} photos", list_.photos.size())};
@@ -155,7 +166,15 @@ class PhotoRun {
     return {process.peakBytes(), line};
   }
 
-  StageOutcome train() {
+  // A model that was trained on something else or in another way is kept beside the new one.
+  StageOutcome train(bool resumes) {
+    std::error_code status;
+    if (!resumes && fs::exists(out("model"), status)) {
+      fs::remove_all(out("model.earlier"), status);
+      fs::rename(out("model"), out("model.earlier"), status);
+      if (status) throw Error(out("model").string(), "", "cannot be renamed: " + status.message(), "check the disk");
+      inform("{} is kept as {}", out("model").string(), out("model.earlier").string());
+    }
     std::vector<std::string> arguments{out("capture").string(), out("model").string(), "--method", options_.method,
                                        "--resume"};
     if (options_.steps > 0) {
@@ -174,7 +193,8 @@ class PhotoRun {
     StageOutcome outcome = runVerb("eval", {out("scene").string(), out("capture").string(), "--json",
                                             out("eval.json").string(), "--report", out("report.html").string()});
     const Json result = Json::parse(readTextFile(out("eval.json")));
-    outcome.summary = fmt::format("held-out PSNR {:.2f} dB; {}", result.value("psnr", 0.0), out("report.html"));
+    outcome.summary =
+        fmt::format("held-out PSNR {:.2f} dB; {}", result.value("psnr", 0.0), out("report.html").string());
     return outcome;
   }
 
@@ -193,7 +213,8 @@ void runFromPhotos(const PhotoRunOptions& options) {
     throw Error(options.out.string(), "", "is the folder of photos itself", "name another folder to write to");
   const FolderLock lock(options.out);
   PhotoRun run(options);
-  runStages(options.out, fmt::format("run {} {}", options.photos, options.out), run.stages(), options.range);
+  runStages(options.out, fmt::format("run {} {}", options.photos.string(), options.out.string()), run.stages(),
+            options.range);
 }
 
 }  // namespace tessera

@@ -15,23 +15,24 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-struct Finished {
+struct Record {
   std::string digest, summary;
+  bool isFinished = false;
   double seconds = 0;
   int64_t peakBytes = 0;
 };
 
-// What run.json of an earlier run says of a stage; nothing if the file is missing or damaged: then all is run again.
-std::vector<std::pair<std::string, Finished>> readFinished(const fs::path& file) {
-  std::vector<std::pair<std::string, Finished>> finished;
+// What run.json of an earlier run says of stages; nothing if the file is missing or damaged: then all is run again.
+std::vector<std::pair<std::string, Record>> readRecords(const fs::path& file) {
+  std::vector<std::pair<std::string, Record>> records;
   constexpr uint64_t kMaxBytes = 1 << 20;
   std::error_code status;
-  if (!fs::exists(file, status)) return finished;
+  if (!fs::exists(file, status)) return records;
   const Json run = Json::parse(readTextFile(file, kMaxBytes), nullptr, false);
-  if (!run.is_object() || !run.contains("stages") || !run["stages"].is_array()) return finished;
+  if (!run.is_object() || !run.contains("stages") || !run["stages"].is_array()) return records;
   for (const Json& stage : run["stages"]) {
     if (!stage.is_object() || !stage.contains("name") || !stage["name"].is_string()) continue;
-    Finished entry;
+    Record entry;
     const auto text = [&](const char* key) {
       return stage.contains(key) && stage[key].is_string() ? stage[key].get<std::string>() : std::string();
     };
@@ -40,16 +41,18 @@ std::vector<std::pair<std::string, Finished>> readFinished(const fs::path& file)
     };
     entry.digest = text("digest");
     entry.summary = text("summary");
+    entry.isFinished = stage.contains("finished") && stage["finished"] == true;
     entry.seconds = number("seconds");
     entry.peakBytes = static_cast<int64_t>(number("peak_bytes"));
-    finished.emplace_back(stage["name"].get<std::string>(), entry);
+    records.emplace_back(stage["name"].get<std::string>(), entry);
   }
-  return finished;
+  return records;
 }
 
-Json toJson(const std::string& name, const Finished& result) {
+Json toJson(const std::string& name, const Record& result) {
   return {{"name", name},
           {"digest", result.digest},
+          {"finished", result.isFinished},
           {"seconds", result.seconds},
           {"peak_bytes", result.peakBytes},
           {"summary", result.summary}};
@@ -83,7 +86,7 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
   requireStage(stages, range.from, "--from");
   requireStage(stages, range.until, "--until");
   const fs::path file = folder / "run.json";
-  const auto before = readFinished(file);
+  const auto before = readRecords(file);
   Json run = {{"version", 1}, {"request", request}, {"stages", Json::array()}};
   std::string digest;
   bool again = false;
@@ -92,17 +95,21 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
     again = again || stage.name == range.from;
     const auto known =
         std::find_if(before.begin(), before.end(), [&](const auto& entry) { return entry.first == stage.name; });
-    Finished result;
-    if (!again && known != before.end() && known->second.digest == digest && stage.isComplete()) {
+    const bool isKnown = !again && known != before.end() && known->second.digest == digest;
+    Record result;
+    if (isKnown && known->second.isFinished && stage.isComplete()) {
       result = known->second;
       fmt::print("{:<10} finished before: {}\n", stage.name, result.summary);
     } else {
       // Results of later stages end with those of this one, also if it is interrupted.
       again = true;
-      writeFileAtomically(file, run.dump(2) + "\n", true);
-      const auto start = std::chrono::steady_clock::now();
-      const StageOutcome outcome = stage.run();
       result.digest = digest;
+      Json begun = run;
+      begun["stages"].push_back(toJson(stage.name, result));
+      writeFileAtomically(file, begun.dump(2) + "\n", true);
+      const auto start = std::chrono::steady_clock::now();
+      const StageOutcome outcome = stage.run(isKnown && !known->second.isFinished);
+      result.isFinished = true;
       result.summary = outcome.summary;
       result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       result.peakBytes = std::max(outcome.peakBytes, residentBytes());

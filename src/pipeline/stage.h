@@ -20,7 +20,9 @@ struct Stage {
   std::string name;
   std::string settings;  // what its result depends on, besides the results of earlier stages
   std::function<bool()> isComplete = [] { return true; };  // whether what it wrote is still there
-  std::function<StageOutcome()> run;
+  // `resumes`: it was interrupted, and nothing that its result depends on has changed since: what it has written so far
+  // may be used.
+  std::function<StageOutcome(bool resumes)> run;
 };
 
 struct StageRange {

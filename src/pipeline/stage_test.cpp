@@ -21,9 +21,9 @@ class Stages : public testing::Test {
                         .settings = settings[i],
                         .isComplete = [this, name] { return name != lost_; },
                         .run =
-                            [this, &ran, name] {
+                            [this, &ran, name](bool resumes) {
                               if (name == failing_) throw Error(name, "", "fails", "repair it");
-                              ran += name + " ";
+                              ran += (resumes ? "resumed " : "") + name + " ";
                               return StageOutcome{0, "done"};
                             }});
     }
@@ -62,7 +62,24 @@ TEST_F(Stages, GoOnAfterAFailure) {
   failing_ = "two";
   EXPECT_EQ(run({"", "", ""}), "one failed");
   failing_.clear();
-  EXPECT_EQ(run({"", "", ""}), "two three ");
+  EXPECT_EQ(run({"", "", ""}), "resumed two three ");
+}
+
+TEST_F(Stages, DoNotResumeWhatBeganWithOtherSettings) {
+  failing_ = "three";
+  EXPECT_EQ(run({"", "", ""}), "one two failed");
+  failing_.clear();
+  EXPECT_EQ(run({"", "", "x"}), "three ");
+  failing_ = "three";
+  EXPECT_EQ(run({"", "", "y"}), "failed");
+  failing_ = "one";
+  EXPECT_EQ(run({"", "", "y"}, {.from = "one"}), "failed");
+  failing_.clear();
+  EXPECT_EQ(run({"", "", "y"}), "resumed one two three ") << "the first may have changed since the third began";
+  failing_ = "two";
+  EXPECT_EQ(run({"", "y", "y"}), "failed");
+  failing_.clear();
+  EXPECT_EQ(run({"", "y", "y"}, {.from = "two"}), "two three ") << "to begin anew was asked for";
 }
 
 TEST_F(Stages, ForgetWhatFollowsAStageThatIsInterrupted) {
@@ -70,7 +87,7 @@ TEST_F(Stages, ForgetWhatFollowsAStageThatIsInterrupted) {
   failing_ = "two";
   EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "failed");
   failing_.clear();
-  EXPECT_EQ(run({"", "", ""}), "two three ") << "what the second made may have changed";
+  EXPECT_EQ(run({"", "", ""}), "resumed two three ") << "what the second made may have changed";
 }
 
 TEST_F(Stages, RunInTheRangeAskedFor) {

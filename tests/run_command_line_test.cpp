@@ -1,0 +1,75 @@
+// `tessera run` as a user runs it: from photos without poses.
+#include <gtest/gtest.h>
+
+#include "base/image_io.h"
+#include "base/testing/shared_data.h"
+#include "base/testing/temporary_folder.h"
+#include "tests/program.h"
+
+namespace tessera {
+namespace {
+
+class RunCommandLine : public testing::Test {
+ protected:
+  Said run(const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"run", photos_.string(), (folder_ / "out").string()};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return Program(folder_.path(), arguments).wait();
+  }
+
+  TemporaryFolder folder_;
+  fs::path photos_ = folder_ / "photos";
+};
+
+TEST_F(RunCommandLine, RefusesFoldersWithoutEnoughPhotos) {
+  Said said = run({});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "is not a folder")) << said.err;
+  writeJpeg(photos_ / "one.jpg", ImageU8(8, 8, 3));
+  said = run({});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "holds 1 photos that can be used")) << said.err;
+  EXPECT_EQ(run({"--method", "field"}).exitCode, 2) << "it is not baked";
+}
+
+TEST_F(RunCommandLine, NamesWhatToInstallAndWhichStagesThereAre) {
+  for (int i = 0; i < 3; ++i)
+    writeJpeg(photos_ / (std::to_string(i) + ".jpg"), ImageU8(8, 8, 3, static_cast<uint8_t>(i)));
+  Said said = run({"--until", "dinner"});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(
+      contains(said.err, "name one of inspect, features, pairs, matches, mapping, capture, train, bake, evaluate"))
+      << said.err;
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", "/nowhere", 1);
+  said = run({});
+  ::setenv("PATH", path.c_str(), 1);
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.out, "3 photos, 0 with GPS, 0 left out; 1 cameras, 1 flights")) << said.out;
+  EXPECT_TRUE(contains(said.err, "apt-get install colmap")) << said.err;
+}
+
+TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
+  if (!isInPath("colmap")) GTEST_SKIP() << "colmap is not installed";
+  // Two names that would confuse COLMAP's lists.
+  const char* names[] = {"a b/DJI_0018.JPG", "a b/DJI 0019.JPG", "DJI_0020.JPG", "DJI_0021.JPG"};
+  for (int i = 0; i < 4; ++i) {
+    fs::create_directories((photos_ / names[i]).parent_path());
+    fs::copy_file(sharedData("brighton_beach") / "images" / ("DJI_00" + std::to_string(18 + i) + ".JPG"),
+                  photos_ / names[i]);
+  }
+  const std::vector<std::string> flags = {"--until", "capture", "--downscale", "8", "--holdout", "none"};
+  Said said = run(flags);
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "4 photos, 0 held out")) << said.out;
+  EXPECT_TRUE(fs::exists(folder_ / "out/capture/images/a b/DJI_0018.png"));
+  const auto made = fs::last_write_time(folder_ / "out/poses/sparse/0/images.bin");
+  said = run(flags);
+  EXPECT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "mapping    finished before")) << said.out;
+  EXPECT_EQ(fs::last_write_time(folder_ / "out/poses/sparse/0/images.bin"), made);
+}
+
+}  // namespace
+}  // namespace tessera
