@@ -293,7 +293,7 @@ TEST_F(CommandLine, ServesUntilItIsInterrupted) {
 
 TEST_F(CommandLine, RecognisesAPlainFolderOfPhotosAndSaysWhatToDo) {
   for (int i = 0; i < 3; ++i) writePng(folder_ / "plain" / (std::to_string(i) + ".png"), ImageU8(8, 6, 3, 90));
-  EXPECT_TRUE(contains(expectFailure({"import", at("plain"), at("out2")}), "colmap"));
+  EXPECT_TRUE(contains(expectFailure({"import", at("plain"), at("out2")}), "tessera run"));
 }
 
 TEST_F(CommandLine, ExplainsWhatIsWrongWithSettings) {

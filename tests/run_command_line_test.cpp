@@ -64,11 +64,11 @@ TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_TRUE(contains(said.out, "4 photos, 0 held out")) << said.out;
   EXPECT_TRUE(fs::exists(folder_ / "out/capture/images/a b/DJI_0018.png"));
-  const auto made = fs::last_write_time(folder_ / "out/poses/sparse/0/images.bin");
+  const auto timeOfModel = fs::last_write_time(folder_ / "out/poses/sparse/0/images.bin");
   said = run(flags);
   EXPECT_EQ(said.exitCode, 0) << said.err;
   EXPECT_TRUE(contains(said.out, "mapping    finished before")) << said.out;
-  EXPECT_EQ(fs::last_write_time(folder_ / "out/poses/sparse/0/images.bin"), made);
+  EXPECT_EQ(fs::last_write_time(folder_ / "out/poses/sparse/0/images.bin"), timeOfModel);
 }
 
 }  // namespace
