@@ -11,6 +11,8 @@
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "base/log.h"
+#include "import/clean.h"
 
 namespace tessera {
 namespace {
@@ -113,6 +115,13 @@ void findFlights(PhotoList& list) {
 
 }  // namespace
 
+void warnLeftOut(const std::vector<LeftOutPhoto>& photos) {
+  std::map<std::string, std::vector<std::string>> byReason;
+  for (const LeftOutPhoto& photo : photos) byReason[photo.reason].push_back(photo.name);
+  for (const auto& [reason, names] : byReason)
+    warn("{} photo{} left out: {} ({})", names.size(), names.size() == 1 ? "" : "s", reason, abbreviateList(names));
+}
+
 double focalLengthInPixels(const CameraTags& camera, int width, int height) {
   if (camera.focalLength35 > 0) return camera.focalLength35 / kFullFrameWidth * std::max(width, height);
   // The resolution is that of the full picture: of a reduced one, it would give too long a focal length. The field of
@@ -131,7 +140,7 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
 
   PhotoList list;
   std::map<std::string, int> bodies;
-  std::map<std::pair<uint64_t, uint64_t>, std::string> seen;
+  std::set<std::pair<uint64_t, uint64_t>> seen;
   std::set<std::string> safeNames;
   const bool hasVisible = std::any_of(headers.begin(), headers.end(),
                                       [](const Header& h) { return h.width > 0 && !h.tags.camera.isThermal; });
@@ -139,16 +148,15 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
     const Header& header = headers[i];
     const std::string name = files[i].lexically_relative(folder).generic_string();
     if (header.width == 0) {
-      list.leftOut.push_back({name, "cannot be read as JPEG or PNG"});
+      list.leftOut.push_back({name, "not readable as JPEG or PNG"});
       continue;
     }
     if (header.tags.camera.isThermal && hasVisible) {
-      list.leftOut.push_back({name, "is an infrared picture"});
+      list.leftOut.push_back({name, "infrared"});
       continue;
     }
-    const auto [first, isNew] = seen.emplace(std::pair(header.fileBytes, header.hash), name);
-    if (!isNew) {
-      list.leftOut.push_back({name, "is a copy of " + first->second});
+    if (!seen.emplace(header.fileBytes, header.hash).second) {
+      list.leftOut.push_back({name, "the same file as another photo"});
       continue;
     }
     const CameraTags& camera = header.tags.camera;

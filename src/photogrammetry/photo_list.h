@@ -45,6 +45,9 @@ inline constexpr double kPauseBetweenFlights = 300;  // seconds
 // read.
 PhotoList listPhotos(const fs::path& folder, ThreadPool& pool);
 
+// Warns of the photos, once for each reason.
+void warnLeftOut(const std::vector<LeftOutPhoto>& photos);
+
 // Returns the focal length in pixels that the tags give for a picture of this width and height; 0 if they do not.
 double focalLengthInPixels(const CameraTags& camera, int width, int height);
 

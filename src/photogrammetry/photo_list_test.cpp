@@ -46,8 +46,8 @@ TEST_F(PhotoLists, LeaveOutWhatIsNoPhotoOrACopy) {
   const PhotoList list = this->list();
   ASSERT_EQ(list.photos.size(), 1u);
   ASSERT_EQ(list.leftOut.size(), 2u);
-  EXPECT_EQ(list.leftOut[0].name + " " + list.leftOut[0].reason, "broken.jpg cannot be read as JPEG or PNG");
-  EXPECT_EQ(list.leftOut[1].name + " " + list.leftOut[1].reason, "two.jpg is a copy of one.jpg");
+  EXPECT_EQ(list.leftOut[0].name + " " + list.leftOut[0].reason, "broken.jpg not readable as JPEG or PNG");
+  EXPECT_EQ(list.leftOut[1].name + " " + list.leftOut[1].reason, "two.jpg the same file as another photo");
 }
 
 TEST_F(PhotoLists, TellSizesApartAsCameras) {

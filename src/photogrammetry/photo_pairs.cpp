@@ -197,4 +197,20 @@ std::vector<PhotoPair> choosePairs(const PhotoList& list, const PairOptions& opt
   return {pairs.begin(), pairs.end()};
 }
 
+std::vector<PhotoPair> chooseMorePairs(const PhotoList& list, const std::vector<int>& photos) {
+  const PairOptions wide{.all = 0,
+                         .partners = 40,
+                         .otherFlight = 20,
+                         .neighbours = 10,
+                         .sequence = 40,
+                         .minOverlap = 0.02,
+                         .maxAngle = 90};
+  std::vector<PhotoPair> pairs = choosePairs(list, wide);
+  std::erase_if(pairs, [&](const PhotoPair& pair) {
+    return std::find(photos.begin(), photos.end(), pair.first) == photos.end() &&
+           std::find(photos.begin(), photos.end(), pair.second) == photos.end();
+  });
+  return pairs;
+}
+
 }  // namespace tessera

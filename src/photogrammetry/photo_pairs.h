@@ -25,4 +25,7 @@ struct PairOptions {
 // looked straight down; all photos with GPS are connected.
 std::vector<PhotoPair> choosePairs(const PhotoList& list, const PairOptions& options = {});
 
+// Returns more pairs for photos that these have not connected with the others: all that may show the same places.
+std::vector<PhotoPair> chooseMorePairs(const PhotoList& list, const std::vector<int>& photos);
+
 }  // namespace tessera

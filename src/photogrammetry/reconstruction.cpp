@@ -31,6 +31,38 @@ int64_t lastRegistered(const fs::path& log) {
   return open == text.npos ? 0 : std::atoll(text.c_str() + open + 1);
 }
 
+constexpr int kPhotosPerSnapshot = 25;
+constexpr int kFewFeatures = 200;
+
+// Returns the number of photos of a model that is complete; 0 of one that was not written to its end.
+size_t photosOfModel(const fs::path& folder) {
+  std::error_code status;
+  if (!fs::exists(folder / "images.bin", status) || !fs::exists(folder / "points3D.bin", status)) return 0;
+  try {
+    return readColmapModel(folder).images.size();
+  } catch (const Error&) {
+    return 0;
+  }
+}
+
+bool isReadable(const fs::path& folder) {
+  return photosOfModel(folder) > 0;
+}
+
+// Returns the folder of the model with the most photos among those in a folder.
+std::optional<fs::path> largestIn(const fs::path& folder) {
+  std::optional<fs::path> largest;
+  size_t most = 0;
+  std::error_code status;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
+    const size_t photos = photosOfModel(entry.path());
+    if (photos <= most) continue;
+    most = photos;
+    largest = entry.path();
+  }
+  return largest;
+}
+
 void linkPhoto(const fs::path& photo, const fs::path& link) {
   std::error_code status;
   if (fs::is_symlink(link, status) && fs::read_symlink(link, status) == photo) return;
@@ -110,42 +142,121 @@ size_t Reconstruction::linkedPairs() const {
   return linked;
 }
 
-void Reconstruction::map(const Watch& watch) {
-  const fs::path sparse = folder_ / "sparse", partial = folder_ / "sparse.partial", log = folder_ / "mapping.log";
+void Reconstruction::runMapper(const fs::path& input, const fs::path& output, const Watch& watch) {
+  const fs::path log = folder_ / "mapping.log", snapshots = folder_ / "snapshots";
   std::error_code status;
-  fs::remove_all(partial, status);
   fs::remove(log, status);
-  fs::create_directories(partial, status);
-  runColmap("mapping",
-            {"mapper",
-             "--database_path",
-             (folder_ / "database.db").string(),
-             "--image_path",
-             (folder_ / "images").string(),
-             "--output_path",
-             partial.string(),
-             "--Mapper.num_threads",
-             threads(),
-             "--Mapper.min_model_size",
-             "3",
-             "--Mapper.init_min_tri_angle",
-             "8",
-             "--Mapper.ba_global_function_tolerance",
-             "1e-6",
-             "--Mapper.ba_global_images_ratio",
-             "1.2",
-             "--Mapper.ba_global_points_ratio",
-             "1.2",
-             "--Mapper.ba_global_max_refinements",
-             "2"},
-            [&] { watch(lastRegistered(log)); });
+  fs::remove_all(output, status);
+  fs::create_directories(output, status);
+  fs::create_directories(snapshots, status);
+  std::vector<std::string> arguments{"mapper",
+                                     "--database_path",
+                                     (folder_ / "database.db").string(),
+                                     "--image_path",
+                                     (folder_ / "images").string(),
+                                     "--output_path",
+                                     output.string(),
+                                     "--Mapper.num_threads",
+                                     threads(),
+                                     "--Mapper.min_model_size",
+                                     "3",
+                                     "--Mapper.init_min_tri_angle",
+                                     "8",
+                                     "--Mapper.ba_global_function_tolerance",
+                                     "1e-6",
+                                     "--Mapper.ba_global_images_ratio",
+                                     "1.2",
+                                     "--Mapper.ba_global_points_ratio",
+                                     "1.2",
+                                     "--Mapper.ba_global_max_refinements",
+                                     "2",
+                                     "--Mapper.snapshot_path",
+                                     snapshots.string(),
+                                     "--Mapper.snapshot_images_freq",
+                                     std::to_string(kPhotosPerSnapshot)};
+  if (!input.empty()) arguments.insert(arguments.end(), {"--input_path", input.string()});
+  runColmap("mapping", std::move(arguments), [&] { watch(lastRegistered(log)); });
+}
+
+void Reconstruction::replaceModels(const fs::path& models) const {
+  const fs::path sparse = folder_ / "sparse", before = folder_ / "sparse.before";
+  std::error_code status;
+  fs::remove_all(before, status);
+  if (fs::exists(sparse, status)) fs::rename(sparse, before, status);
+  fs::rename(models, sparse, status);
+  if (status) throw Error(sparse.string(), "", "cannot be made: " + status.message(), "check the disk");
+  fs::remove_all(before, status);
+  fs::remove_all(folder_ / "snapshots", status);
+}
+
+void Reconstruction::map(bool resumes, const Watch& watch) {
+  const fs::path partial = folder_ / "sparse.partial", begun = folder_ / "sparse.begun";
+  std::error_code status;
+  fs::remove_all(begun, status);
+  // The names of snapshots are times that overflow: the one with the most photos is the last.
+  if (const auto last = resumes ? largestIn(folder_ / "snapshots") : std::nullopt) fs::rename(*last, begun, status);
+  fs::remove_all(folder_ / "snapshots", status);
+  runMapper(fs::exists(begun, status) ? begun : fs::path(), partial, watch);
+  fs::remove_all(begun, status);
   if (fs::is_empty(partial, status)) {
     throw Error(folder_.string(), "", "no two photos could be placed relative to each other",
                 "check that neighbouring photos overlap by more than half, and are sharp");
   }
-  fs::remove_all(sparse, status);
-  fs::rename(partial, sparse, status);
-  if (status) throw Error(sparse.string(), "", "cannot be made: " + status.message(), "check the disk");
+  replaceModels(partial);
+}
+
+void Reconstruction::extendMap(const Watch& watch) {
+  const std::optional<fs::path> model = findColmapModel(folder_);
+  if (!model) return;
+  const fs::path partial = folder_ / "sparse.partial";
+  runMapper(*model, partial, watch);
+  std::error_code status;
+  if (isReadable(partial)) replaceModels(partial);
+  fs::remove_all(partial, status);
+}
+
+std::vector<int> Reconstruction::placed() const {
+  std::vector<int> photos;
+  const std::optional<fs::path> model = findColmapModel(folder_);
+  if (!model) return photos;
+  for (const ColmapModel::Image& image : readColmapModel(*model).images)
+    photos.push_back(static_cast<int>(image.id) - 1);
+  std::sort(photos.begin(), photos.end());
+  return photos;
+}
+
+std::vector<int> Reconstruction::unplacedPhotos() const {
+  const std::vector<int> inModel = placed();
+  std::vector<int> missing;
+  for (int i = 0; i < static_cast<int>(list_.photos.size()); ++i) {
+    if (!std::binary_search(inModel.begin(), inModel.end(), i)) missing.push_back(i);
+  }
+  return missing;
+}
+
+std::vector<LeftOutPhoto> Reconstruction::unplaced() const {
+  const ColmapDatabase database(folder_ / "database.db");
+  const std::map<int, int> features = database.features();
+  std::map<int, int> links;
+  for (const auto& [pair, inliers] : database.inliers()) {
+    if (inliers == 0) continue;
+    ++links[pair.first];
+    ++links[pair.second];
+  }
+  std::vector<LeftOutPhoto> photos;
+  for (const int i : unplacedPhotos()) {
+    const auto count = features.find(i);
+    std::string reason = "not consistent with the others";
+    if (count == features.end()) {
+      reason = "not decodable";
+    } else if (count->second < kFewFeatures) {
+      reason = "few features, as of water, sky or a blurred picture";
+    } else if (!links.contains(i)) {
+      reason = "nothing in common with another photo";
+    }
+    photos.push_back({list_.photos[static_cast<size_t>(i)].name, reason});
+  }
+  return photos;
 }
 
 SourceCapture Reconstruction::largestModel() const {

@@ -29,14 +29,23 @@ class Reconstruction {
   // Compares pairs that have not been compared yet.
   void match(const std::vector<PhotoPair>& pairs, const Watch& watch);
   size_t linkedPairs() const;  // of those compared, the pairs that one geometry explains
-  // Estimates poses. Throws Error if no model results.
-  void map(const Watch& watch);
+  // Estimates poses. `resumes`: goes on from the last snapshot of a call that was interrupted. Throws Error if no model
+  // results.
+  void map(bool resumes, const Watch& watch);
+  // Adds photos to the largest model that further matches have connected with it.
+  void extendMap(const Watch& watch);
+  // Returns the photos that the largest model lacks, each with the likely reason.
+  std::vector<LeftOutPhoto> unplaced() const;
+  std::vector<int> unplacedPhotos() const;  // their indices
   // Returns the largest model, with photos under their own names.
   SourceCapture largestModel() const;
 
   int64_t peakBytes() const { return peakBytes_; }  // of the programs that it ran
 
  private:
+  void runMapper(const fs::path& input, const fs::path& output, const Watch& watch);
+  void replaceModels(const fs::path& models) const;
+  std::vector<int> placed() const;
   void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
   std::string threads() const;
 

@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 #include <sqlite3.h>
 
+#include <algorithm>
+
 #include "base/error.h"
 #include "base/image_io.h"
+#include "base/testing/shared_data.h"
 #include "base/testing/temporary_folder.h"
 #include "photogrammetry/colmap_database.h"
 #include "photogrammetry/colmap_program.h"
@@ -120,9 +123,68 @@ TEST(Reconstruction, SaysThatNoPhotosCouldBePlaced) {
   list.bodies = {{"a", 800, 600, 640}};
   const fs::path program = writeProgram(folder, "[ $1 != help ] || echo 'COLMAP 3.8 --'");
   Reconstruction reconstruction(folder / "poses", list, {.colmap = program.string()});
-  const std::string message = errorMessage([&] { reconstruction.map([](int64_t) {}); });
+  const std::string message = errorMessage([&] { reconstruction.map(false, [](int64_t) {}); });
   EXPECT_NE(message.find("no two photos could be placed"), std::string::npos) << message;
   EXPECT_FALSE(fs::exists(folder / "poses/sparse"));
+}
+
+// The photos of brighton_beach, and two that its model lacks.
+PhotoList beachPhotos() {
+  PhotoList list;
+  list.bodies = {{"drone", 1600, 900, 889}};
+  for (const auto& entry : fs::directory_iterator(sharedData("brighton_beach") / "images"))
+    list.photos.push_back({entry.path().filename().string(), entry.path().filename().string(), entry.path(), 0, 0, {}});
+  std::sort(list.photos.begin(), list.photos.end(),
+            [](const ListedPhoto& a, const ListedPhoto& b) { return a.name < b.name; });
+  for (const char* name : {"fog.jpg", "indoors.jpg"}) list.photos.push_back({name, name, name, 0, 0, {}});
+  return list;
+}
+
+// Stands in for the mapper: it writes a snapshot and fails; with a model to go on from, it returns that model.
+std::string mapperScript(const fs::path& model) {
+  return "case $1 in help) echo 'COLMAP 3.8 --'; exit;; esac\n"
+         "while [ $# -gt 0 ]; do case $1 in --output_path) out=$2;; --input_path) in=$2;; --Mapper.snapshot_path) "
+         "snapshots=$2;; esac; shift; done\n"
+         "if [ -n \"$in\" ]; then cp $in/* $out; exit; fi\n"
+         "mkdir $snapshots/18446744073709551615 $snapshots/7; cp " +
+         model.string() +
+         "/*.bin $snapshots/18446744073709551615; cp $snapshots/18446744073709551615/images.bin $snapshots/7; exit 1\n";
+}
+
+TEST(Reconstruction, GoesOnFromTheLastSnapshotThatIsWhole) {
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
+  const TemporaryFolder folder;
+  const PhotoList list = beachPhotos();
+  const fs::path program = writeProgram(folder, mapperScript(sharedData("brighton_beach") / "sparse/0"));
+  Reconstruction reconstruction(folder / "poses", list, {.colmap = program.string()});
+  EXPECT_THROW(reconstruction.map(false, [](int64_t) {}), Error);
+  EXPECT_TRUE(fs::exists(folder / "poses/snapshots/7"));
+  reconstruction.map(true, [](int64_t) {});
+  EXPECT_EQ(reconstruction.unplacedPhotos(), (std::vector<int>{18, 19}));
+  EXPECT_EQ(reconstruction.largestModel().capture.photos.size(), 18u);
+  EXPECT_FALSE(fs::exists(folder / "poses/snapshots"));
+  EXPECT_THROW(reconstruction.map(false, [](int64_t) {}), Error) << "a new beginning has no snapshot to go on from";
+  EXPECT_EQ(reconstruction.largestModel().capture.photos.size(), 18u) << "models remain until others replace them";
+}
+
+TEST(Reconstruction, SaysWhyPhotosAreMissing) {
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
+  const TemporaryFolder folder;
+  const PhotoList list = beachPhotos();
+  const fs::path program = writeProgram(folder, mapperScript(sharedData("brighton_beach") / "sparse/0"));
+  Reconstruction reconstruction(folder / "poses", list, {.colmap = program.string()});
+  EXPECT_THROW(reconstruction.map(false, [](int64_t) {}), Error);
+  reconstruction.map(true, [](int64_t) {});
+  makeDatabase(folder / "poses/database.db");
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open((folder / "poses/database.db").c_str(), &handle), SQLITE_OK);
+  sqlite3_exec(handle, "INSERT INTO keypoints VALUES(19, 12), (20, 4000)", nullptr, nullptr, nullptr);
+  sqlite3_close(handle);
+  const std::vector<LeftOutPhoto> unplaced = reconstruction.unplaced();
+  ASSERT_EQ(unplaced.size(), 2u);
+  EXPECT_EQ(unplaced[0].name + ": " + unplaced[0].reason,
+            "fog.jpg: few features, as of water, sky or a blurred picture");
+  EXPECT_EQ(unplaced[1].name + ": " + unplaced[1].reason, "indoors.jpg: nothing in common with another photo");
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ class PhotoRun {
                   fmt::format("holds {} photos that can be used; poses need three", list_.photos.size()),
                   "name a folder of JPEG or PNG photos");
     }
-    for (const LeftOutPhoto& photo : list_.leftOut) warn("{} {}; left out", photo.name, photo.reason);
+    warnLeftOut(list_.leftOut);
     reconstruction_ =
         std::make_unique<Reconstruction>(out("poses"), list_, ReconstructionOptions{.threads = options.threads});
   }
@@ -55,7 +55,7 @@ class PhotoRun {
         {.name = "mapping",
          .settings = "",
          .isComplete = has("poses/sparse"),
-         .run = [this](bool) { return mapping(); }},
+         .run = [this](bool resumes) { return mapping(resumes); }},
         {.name = "capture",
          .settings = fmt::format("{} {}", downscale(), options_.holdout),
          .isComplete = has("capture/transforms.json"),
@@ -125,12 +125,18 @@ class PhotoRun {
     return {reconstruction_->peakBytes(), fmt::format("{} of {} pairs show the same places", linked, chosen.size())};
   }
 
-  StageOutcome mapping() {
+  StageOutcome mapping(bool resumes) {
     Progress progress("mapping", static_cast<int64_t>(list_.photos.size()), "photos");
-    reconstruction_->map([&](int64_t done) { progress.update(done); });
-    const SourceCapture model = reconstruction_->largestModel();
-    return {reconstruction_->peakBytes(), fmt::format("{} of {} photos, {} points", model.capture.photos.size(),
-                                                      list_.photos.size(), model.capture.points.size())};
+    reconstruction_->map(resumes, [&](int64_t done) { progress.update(done); });
+    if (const std::vector<int> missing = reconstruction_->unplacedPhotos(); !missing.empty()) {
+      inform("{} photos could not be placed; they are compared with more of the others", missing.size());
+      reconstruction_->match(chooseMorePairs(list_, missing), [](int64_t) {});
+      reconstruction_->extendMap([&](int64_t done) { progress.update(done); });
+    }
+    const std::vector<LeftOutPhoto> unplaced = reconstruction_->unplaced();
+    warnLeftOut(unplaced);
+    return {reconstruction_->peakBytes(),
+            fmt::format("{} of {} photos", list_.photos.size() - unplaced.size(), list_.photos.size())};
   }
 
   int downscale() const {
