@@ -30,6 +30,12 @@ TEST_F(RunCommandLine, RefusesFoldersWithoutEnoughPhotos) {
   EXPECT_EQ(said.exitCode, 1);
   EXPECT_TRUE(contains(said.err, "holds 1 photos that can be used")) << said.err;
   EXPECT_EQ(run({"--method", "field"}).exitCode, 2) << "it is not baked";
+  for (const char* out : {"", "/out"}) {
+    said = Program(folder_.path(), {"run", photos_.string(), photos_.string() + out}).wait();
+    EXPECT_EQ(said.exitCode, 1);
+    EXPECT_TRUE(contains(said.err, "would be taken for photos")) << said.err;
+  }
+  EXPECT_FALSE(fs::exists(photos_ / "out"));
 }
 
 TEST_F(RunCommandLine, NamesWhatToInstallAndWhichStagesThereAre) {

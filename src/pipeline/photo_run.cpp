@@ -118,7 +118,7 @@ class PhotoRun {
   }
 
   StageOutcome matches() {
-    const auto chosen = Json::parse(readTextFile(out("poses/pairs.json"))).get<std::vector<PhotoPair>>();
+    const std::vector<PhotoPair> chosen = choosePairs(list_);
     Progress progress("matches", static_cast<int64_t>(chosen.size()), "pairs");
     reconstruction_->match(chosen, [&](int64_t done) { progress.update(done); });
     const size_t linked = reconstruction_->linkedPairs();
@@ -215,8 +215,11 @@ void runFromPhotos(const PhotoRunOptions& options) {
   std::error_code status;
   if (!fs::is_directory(options.photos, status))
     throw Error(options.photos.string(), "", "is not a folder", "name a folder of photos");
-  if (fs::weakly_canonical(options.photos) == fs::weakly_canonical(options.out))
-    throw Error(options.out.string(), "", "is the folder of photos itself", "name another folder to write to");
+  const fs::path inside = fs::weakly_canonical(options.out).lexically_relative(fs::weakly_canonical(options.photos));
+  if (!inside.empty() && *inside.begin() != "..") {
+    throw Error(options.out.string(), "", "is the folder of photos, or in it: its pictures would be taken for photos",
+                "name another folder to write to");
+  }
   const FolderLock lock(options.out);
   PhotoRun run(options);
   runStages(options.out, fmt::format("run {} {}", options.photos.string(), options.out.string()), run.stages(),
