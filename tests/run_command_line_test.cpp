@@ -36,6 +36,17 @@ TEST_F(RunCommandLine, RefusesFoldersWithoutEnoughPhotos) {
     EXPECT_TRUE(contains(said.err, "would be taken for photos")) << said.err;
   }
   EXPECT_FALSE(fs::exists(photos_ / "out"));
+  EXPECT_EQ(run({"--holdout", "every:0"}).exitCode, 1);
+}
+
+TEST_F(RunCommandLine, RefusesFoldersThatItDidNotMake) {
+  for (int i = 0; i < 3; ++i)
+    writeJpeg(photos_ / (std::to_string(i) + ".jpg"), ImageU8(8, 8, 3, static_cast<uint8_t>(i)));
+  writeFileAtomically(folder_ / "out/poses/database.db", "of another program");
+  const Said said = run({});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "would be replaced")) << said.err;
+  EXPECT_EQ(readTextFile(folder_ / "out/poses/database.db"), "of another program");
 }
 
 TEST_F(RunCommandLine, NamesWhatToInstallAndWhichStagesThereAre) {

@@ -55,20 +55,12 @@ struct Fit {
   std::vector<int> inliers;
 };
 
-constexpr size_t kLeastOfFlight = 3;  // fixes
+constexpr size_t kLeastOfFlight = 3;     // fixes
+constexpr double kLeastHeightError = 3;  // metres; less is usual for GPS
 
-// Finds the heights by which flights are too high, and the fixes that agree.
+// Finds the fixes that agree.
 void judge(const Fixes& fixes, Fit& fit) {
   const Points mapped = (fit.enuFromWorld * fixes.world.colwise().homogeneous()).topRows<3>();
-  const auto above = [&](int i) { return fixes.enu(2, i) - mapped(2, i); };
-  fit.tooHigh.assign(fixes.ofFlight.size(), 0);
-  const bool isOne = fixes.ofFlight.size() == 1;
-  for (size_t f = 0; f < fixes.ofFlight.size() && !isOne; ++f) {
-    if (fixes.ofFlight[f].size() < kLeastOfFlight) continue;
-    std::vector<double> heights;
-    for (const int i : fixes.ofFlight[f]) heights.push_back(above(i));
-    fit.tooHigh[f] = upperMedian(heights);
-  }
   const Points places = fixes.corrected(fit.tooHigh);
   fit.inliers.clear();
   for (Eigen::Index i = 0; i < places.cols(); ++i) {
@@ -84,15 +76,83 @@ void refine(const Fixes& fixes, Fit& fit) {
   judge(fixes, fit);
 }
 
-// Altitudes are relative to the median flight.
-void shiftToMedianFlight(const Fixes& fixes, Fit& fit) {
-  std::vector<double> known;
-  for (size_t f = 0; f < fixes.ofFlight.size(); ++f)
-    if (fixes.ofFlight[f].size() >= kLeastOfFlight) known.push_back(fit.tooHigh[f]);
-  if (fixes.ofFlight.size() == 1 || known.empty()) return;
-  std::sort(known.begin(), known.end());
-  const double middle = 0.5 * (known[(known.size() - 1) / 2] + known[known.size() / 2]);
-  fit.enuFromWorld(2, 3) += middle;
+// Returns for each flight the median height of its fixes above those of the similarity; nothing for flights of few
+// fixes.
+std::vector<std::optional<double>> heightsAbove(const Fixes& fixes, const Fit& fit) {
+  const Points mapped = (fit.enuFromWorld * fixes.world.colwise().homogeneous()).topRows<3>();
+  std::vector<std::optional<double>> heights(fixes.ofFlight.size());
+  for (size_t f = 0; f < heights.size(); ++f) {
+    if (fixes.ofFlight[f].size() < kLeastOfFlight) continue;
+    std::vector<double> ofFlight;
+    for (const int i : fixes.ofFlight[f]) ofFlight.push_back(fixes.enu(2, i) - mapped(2, i));
+    heights[f] = upperMedian(ofFlight);
+  }
+  return heights;
+}
+
+// A step of Gauss and Newton on the similarity and the heights of the flights `corrected` together: in turns, they
+// would converge slowly where flights lie side by side.
+void improve(const Fixes& fixes, const std::vector<size_t>& corrected, Fit& fit) {
+  if (fit.inliers.size() < 3) return;
+  const Points mapped =
+      (fit.enuFromWorld * selectColumns(fixes.world, fit.inliers).colwise().homogeneous()).topRows<3>();
+  const Vec3d middle = mapped.rowwise().mean();
+  // Unknowns: rotation and scale about the middle, translation, heights.
+  const auto unknowns = static_cast<Eigen::Index>(7 + corrected.size());
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(unknowns, unknowns);
+  Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
+  for (Eigen::Index k = 0; k < mapped.cols(); ++k) {
+    const auto fix = static_cast<size_t>(fit.inliers[static_cast<size_t>(k)]);
+    const Vec3d q = mapped.col(k) - middle;
+    Eigen::MatrixXd row = Eigen::MatrixXd::Zero(3, unknowns);
+    row.leftCols<3>() << 0, q.z(), -q.y(), -q.z(), 0, q.x(), q.y(), -q.x(), 0;
+    row.col(3) = q;
+    row.middleCols<3>(4) = Mat3d::Identity();
+    const auto of = std::find(corrected.begin(), corrected.end(), static_cast<size_t>(fixes.flight[fix]));
+    if (of != corrected.end()) row(2, 7 + (of - corrected.begin())) = 1;
+    normal += row.transpose() * row;
+    right += row.transpose() * (fixes.enu.col(static_cast<Eigen::Index>(fix)) - mapped.col(k));
+  }
+  const Eigen::VectorXd change = normal.completeOrthogonalDecomposition().solve(right);
+  const Vec3d rotation = change.head<3>();
+  Mat4d step = Mat4d::Identity();
+  const Mat3d turn = rotation.norm() > 0 ? Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix()
+                                         : Mat3d::Identity();
+  step.topLeftCorner<3, 3>() = std::exp(change[3]) * turn;
+  step.topRightCorner<3, 1>() = middle + change.segment<3>(4) - step.topLeftCorner<3, 3>() * middle;
+  fit.enuFromWorld = step * fit.enuFromWorld;
+  for (size_t f = 0; f < corrected.size(); ++f) fit.tooHigh[corrected[f]] = change[static_cast<Eigen::Index>(7 + f)];
+}
+
+// Corrects flights whose altitudes clearly differ from those of the reference flight: of all fixes in the order of
+// their flights' heights, it has the middle one. Only these are corrected: heights that were free for every flight
+// would let the world tilt.
+void correctFlights(const Fixes& fixes, Fit& fit) {
+  const std::vector<std::optional<double>> heights = heightsAbove(fixes, fit);
+  std::vector<std::pair<double, size_t>> order;  // height, number of fixes
+  size_t all = 0;
+  for (size_t f = 0; f < heights.size(); ++f) {
+    if (!heights[f]) continue;
+    order.emplace_back(*heights[f], fixes.ofFlight[f].size());
+    all += fixes.ofFlight[f].size();
+  }
+  if (order.size() < 2) return;
+  std::sort(order.begin(), order.end());
+  size_t reference = 0;
+  for (size_t before = order[0].second; 2 * before < all; before += order[++reference].second) {
+  }
+  const double standard = order[reference].first;
+  std::vector<size_t> corrected;
+  for (size_t f = 0; f < heights.size(); ++f)
+    if (heights[f] && std::abs(*heights[f] - standard) > kLeastHeightError) corrected.push_back(f);
+  if (corrected.empty()) return;
+  fit.enuFromWorld(2, 3) += standard;
+  constexpr int kRounds = 8;
+  for (const size_t f : corrected) fit.tooHigh[f] = *heights[f] - standard;
+  for (int round = 0; round < kRounds; ++round) {
+    judge(fixes, fit);
+    improve(fixes, corrected, fit);
+  }
   judge(fixes, fit);
 }
 
@@ -159,33 +219,27 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
   constexpr uint64_t kTrials = 1000;
   for (uint64_t trial = 0; trial < kTrials && static_cast<int>(best.inliers.size()) < n; ++trial) {
     std::vector<int> sample;
-    // All of one flight, whose altitudes have the same error.
-    const auto first = static_cast<size_t>(random.below(trial * 64, static_cast<uint32_t>(n)));
-    const std::vector<int>& among = fixes.ofFlight[static_cast<size_t>(fixes.flight[first])];
-    for (uint64_t k = 1; sample.size() < std::min<size_t>(3, among.size()) && k < 64; ++k) {
-      const int candidate = among[random.below(trial * 64 + k, static_cast<uint32_t>(among.size()))];
+    for (uint64_t k = 0; sample.size() < 3; ++k) {
+      const auto candidate = static_cast<int>(random.below(trial * 64 + k, static_cast<uint32_t>(n)));
       if (std::find(sample.begin(), sample.end(), candidate) == sample.end()) sample.push_back(candidate);
     }
-    if (sample.size() < 3) continue;
     const Points from = selectColumns(world, sample), to = selectColumns(enu, sample);
     if (isLine(from) || isLine(to)) continue;
     Fit fit;
     fit.enuFromWorld = Eigen::umeyama(from, to);
+    fit.tooHigh.assign(fixes.ofFlight.size(), 0);
     judge(fixes, fit);
     // Refine on all inliers: three noisy fixes of nearby photos alone constrain the rotation too weakly.
     for (int round = 0; round < 3; ++round) refine(fixes, fit);
     if (fit.inliers.size() > best.inliers.size()) best = std::move(fit);
   }
+  if (best.inliers.size() >= 3) correctFlights(fixes, best);
   if (best.inliers.size() < 3 || 2 * static_cast<int>(best.inliers.size()) < n ||
       isLine(selectColumns(world, best.inliers))) {
     reason = fmt::format("only {} of {} GPS fixes agree with the poses to within {} m", best.inliers.size(), n,
                          kGpsTolerance);
     return std::nullopt;
   }
-  // Similarity and heights are fitted in turns.
-  constexpr int kLastRounds = 20;
-  for (int round = 0; round < kLastRounds; ++round) refine(fixes, best);
-  shiftToMedianFlight(fixes, best);
   result.frame.enuFromWorld = best.enuFromWorld;
   result.heightsTooHigh = best.tooHigh;
   result.inliers = static_cast<int>(best.inliers.size());

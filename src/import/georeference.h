@@ -16,7 +16,7 @@ struct Georeference {
   GeoFrame frame;  // origin: the mean of the photos' fixes; enuFromWorld: the similarity
   int inliers = 0, fixes = 0;
   double rmsMetres = 0;                // of the inliers, in three dimensions
-  std::vector<double> heightsTooHigh;  // by flight: metres by which its altitudes exceed those of the median flight
+  std::vector<double> heightsTooHigh;  // by flight: metres by which its altitudes are too high, corrected
 };
 
 inline constexpr double kGpsTolerance = 8;  // metres

@@ -82,10 +82,9 @@ Up findUp(const std::vector<Photo>& photos, const std::vector<std::optional<Gimb
 
 // A flight whose altitudes are wrong is named by its first photo.
 void warnOfHeights(const SourceCapture& source, const Georeference& fit) {
-  constexpr double kLeastMetres = 3;  // less is usual for GPS
   for (size_t flight = 0; flight < fit.heightsTooHigh.size(); ++flight) {
     const double metres = fit.heightsTooHigh[flight];
-    if (std::abs(metres) < kLeastMetres) continue;
+    if (metres == 0) continue;
     const auto first = std::find(source.flight.begin(), source.flight.end(), static_cast<int>(flight));
     warn("the altitudes of the flight that begins with {} are {:.1f} m {} for those of the others; corrected",
          source.capture.photos[static_cast<size_t>(first - source.flight.begin())].name, std::abs(metres),

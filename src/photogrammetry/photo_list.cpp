@@ -42,15 +42,17 @@ bool isPhotoName(const fs::path& path) {
 std::vector<fs::path> photoFiles(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code status;
-  fs::recursive_directory_iterator at(folder, fs::directory_options::skip_permission_denied, status), end;
-  if (status) throw Error(folder.string(), "", status.message(), "name a folder of photos");
-  for (; at != end; at.increment(status)) {
-    if (status) throw Error(folder.string(), "", status.message(), "check the disk");
-    const bool isHidden = at->path().filename().string().starts_with(".");
+  fs::recursive_directory_iterator at(folder, status), end;
+  fs::path last = folder;
+  for (; !status && at != end; at.increment(status)) {
+    last = at->path();
+    const bool isHidden = last.filename().string().starts_with(".");
     std::error_code ignored;
     if (isHidden && at->is_directory(ignored)) at.disable_recursion_pending();
-    if (!isHidden && isPhotoName(at->path()) && at->is_regular_file(ignored)) files.push_back(at->path());
+    if (!isHidden && isPhotoName(last) && at->is_regular_file(ignored)) files.push_back(last);
   }
+  // A shorter list would be taken for other photos, and poses of all would be lost.
+  if (status) throw Error(last.string(), "", "cannot be listed: " + status.message(), "make it readable, or remove it");
   return files;
 }
 
@@ -123,12 +125,14 @@ void warnLeftOut(const std::vector<LeftOutPhoto>& photos) {
 }
 
 double focalLengthInPixels(const CameraTags& camera, int width, int height) {
-  if (camera.focalLength35 > 0) return camera.focalLength35 / kFullFrameWidth * std::max(width, height);
+  const double longSide = std::max(width, height);
+  const auto plausible = [longSide](double focal) {
+    return focal > 0.3 * longSide && focal < 10 * longSide ? focal : 0;
+  };
+  if (camera.focalLength35 > 0) return plausible(camera.focalLength35 / kFullFrameWidth * longSide);
   // The resolution is that of the full picture: of a reduced one, it would give too long a focal length. The field of
   // view then is implausible.
-  const double focal = camera.focalLength * camera.pixelsPerMillimetre;
-  const double longSide = std::max(width, height);
-  return focal > 0.3 * longSide && focal < 10 * longSide ? focal : 0;
+  return plausible(camera.focalLength * camera.pixelsPerMillimetre);
 }
 
 PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {

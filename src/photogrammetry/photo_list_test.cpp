@@ -81,6 +81,7 @@ TEST(FocalLengths, FollowFromTheFieldOfViewOrTheSensor) {
   EXPECT_NEAR(focalLengthInPixels({.focalLength35 = 24}, 3000, 4000), 24.0 / 36 * 4000, 1e-9);
   EXPECT_NEAR(focalLengthInPixels({.focalLength = 8.8, .pixelsPerMillimetre = 416}, 5472, 3648), 8.8 * 416, 1e-9);
   EXPECT_EQ(focalLengthInPixels({.focalLength = 8.8, .pixelsPerMillimetre = 41600}, 5472, 3648), 0) << "implausible";
+  EXPECT_EQ(focalLengthInPixels({.focalLength35 = 65535}, 4000, 3000), 0);
   EXPECT_EQ(focalLengthInPixels({}, 5472, 3648), 0);
 }
 

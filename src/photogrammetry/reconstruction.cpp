@@ -34,6 +34,10 @@ int64_t lastRegistered(const fs::path& log) {
 constexpr int kPhotosPerSnapshot = 25;
 constexpr int kFewFeatures = 200;
 
+bool saysNoModel(const fs::path& log) {
+  return readTextFile(log).find("failed to create sparse model") != std::string::npos;
+}
+
 // Returns the number of photos of a model that is complete; 0 of one that was not written to its end.
 size_t photosOfModel(const fs::path& folder) {
   std::error_code status;
@@ -74,11 +78,7 @@ void linkPhoto(const fs::path& photo, const fs::path& link) {
 }  // namespace
 
 Reconstruction::Reconstruction(fs::path folder, const PhotoList& list, ReconstructionOptions options)
-    : folder_(std::move(folder)), list_(list), options_(std::move(options)) {
-  std::error_code status;
-  fs::create_directories(folder_ / "images", status);
-  if (status) throw Error(folder_.string(), "", "cannot be made: " + status.message(), "name another folder");
-}
+    : folder_(std::move(folder)), list_(list), options_(std::move(options)) {}
 
 std::string Reconstruction::threads() const {
   return options_.threads > 0 ? std::to_string(options_.threads) : "-1";
@@ -91,7 +91,24 @@ void Reconstruction::runColmap(const char* step, std::vector<std::string> argume
   peakBytes_ = std::max(peakBytes_, colmap.peakBytes());
 }
 
+void Reconstruction::discardFeatures() const {
+  // The log of the database goes first: it would be replayed into a new one.
+  for (const char* name :
+       {"database.db-wal", "database.db-shm", "database.db", "snapshots", "sparse.begun", "images"}) {
+    std::error_code status;
+    fs::remove_all(folder_ / name, status);
+    if (status) throw Error((folder_ / name).string(), "", "cannot be removed: " + status.message(), "remove it");
+  }
+}
+
+void Reconstruction::makeFolder() const {
+  std::error_code status;
+  fs::create_directories(folder_ / "images", status);
+  if (status) throw Error(folder_.string(), "", "cannot be made: " + status.message(), "name another folder");
+}
+
 void Reconstruction::extractFeatures(const Watch& watch) {
+  makeFolder();
   const fs::path database = folder_ / "database.db";
   if (!fs::exists(database)) {
     const fs::path partial = folder_ / "database.partial.db";
@@ -187,18 +204,28 @@ void Reconstruction::replaceModels(const fs::path& models) const {
   if (status) throw Error(sparse.string(), "", "cannot be made: " + status.message(), "check the disk");
   fs::remove_all(before, status);
   fs::remove_all(folder_ / "snapshots", status);
+  fs::remove_all(folder_ / "sparse.begun", status);
 }
 
 void Reconstruction::map(bool resumes, const Watch& watch) {
+  makeFolder();
   const fs::path partial = folder_ / "sparse.partial", begun = folder_ / "sparse.begun";
   std::error_code status;
-  fs::remove_all(begun, status);
-  // The names of snapshots are times that overflow: the one with the most photos is the last.
-  if (const auto last = resumes ? largestIn(folder_ / "snapshots") : std::nullopt) fs::rename(*last, begun, status);
+  if (!resumes) fs::remove_all(begun, status);
+  // The names of snapshots are times that overflow: the one with the most photos is the last. It is kept until the
+  // next.
+  if (const auto last = resumes ? largestIn(folder_ / "snapshots") : std::nullopt) {
+    fs::remove_all(begun, status);
+    fs::rename(*last, begun, status);
+  }
   fs::remove_all(folder_ / "snapshots", status);
-  runMapper(fs::exists(begun, status) ? begun : fs::path(), partial, watch);
-  fs::remove_all(begun, status);
-  if (fs::is_empty(partial, status)) {
+  try {
+    runMapper(isReadable(begun) ? begun : fs::path(), partial, watch);
+  } catch (const Error&) {
+    // Without any model, the mapper reports failure, too.
+    if (!saysNoModel(folder_ / "mapping.log")) throw;
+  }
+  if (!isReadable(partial) && !largestIn(partial)) {
     throw Error(folder_.string(), "", "no two photos could be placed relative to each other",
                 "check that neighbouring photos overlap by more than half, and are sharp");
   }
@@ -211,7 +238,7 @@ void Reconstruction::extendMap(const Watch& watch) {
   const fs::path partial = folder_ / "sparse.partial";
   runMapper(*model, partial, watch);
   std::error_code status;
-  if (isReadable(partial)) replaceModels(partial);
+  if (photosOfModel(partial) >= photosOfModel(*model)) replaceModels(partial);
   fs::remove_all(partial, status);
 }
 

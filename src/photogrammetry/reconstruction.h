@@ -19,13 +19,15 @@ struct ReconstructionOptions {
 
 class Reconstruction {
  public:
-  // `folder` is created if it does not exist. `list` must outlive this object. Throws Error if colmap cannot be used.
+  // `folder` is created when it is written to. `list` must outlive this object.
   Reconstruction(fs::path folder, const PhotoList& list, ReconstructionOptions options);
 
   // Called now and then with the number of photos or pairs that are done.
   using Watch = std::function<void(int64_t done)>;
 
   void extractFeatures(const Watch& watch);
+  // Removes features, matches and snapshots, which belong to other photos. Throws Error if a file cannot be removed.
+  void discardFeatures() const;
   // Compares pairs that have not been compared yet.
   void match(const std::vector<PhotoPair>& pairs, const Watch& watch);
   size_t linkedPairs() const;  // of those compared, the pairs that one geometry explains
@@ -43,6 +45,7 @@ class Reconstruction {
   int64_t peakBytes() const { return peakBytes_; }  // of the programs that it ran
 
  private:
+  void makeFolder() const;
   void runMapper(const fs::path& input, const fs::path& output, const Watch& watch);
   void replaceModels(const fs::path& models) const;
   std::vector<int> placed() const;

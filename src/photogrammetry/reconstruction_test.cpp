@@ -121,7 +121,8 @@ TEST(Reconstruction, SaysThatNoPhotosCouldBePlaced) {
   const TemporaryFolder folder;
   PhotoList list;
   list.bodies = {{"a", 800, 600, 640}};
-  const fs::path program = writeProgram(folder, "[ $1 != help ] || echo 'COLMAP 3.8 --'");
+  const fs::path program = writeProgram(
+      folder, "case $1 in help) echo 'COLMAP 3.8 --';; *) echo 'ERROR: failed to create sparse model'; exit 1;; esac");
   Reconstruction reconstruction(folder / "poses", list, {.colmap = program.string()});
   const std::string message = errorMessage([&] { reconstruction.map(false, [](int64_t) {}); });
   EXPECT_NE(message.find("no two photos could be placed"), std::string::npos) << message;

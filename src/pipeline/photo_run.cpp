@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/progress.h"
+#include "import/holdout.h"
 #include "import/importer.h"
 #include "photogrammetry/photo_list.h"
 #include "photogrammetry/photo_pairs.h"
@@ -43,7 +44,8 @@ class PhotoRun {
         {.name = "features",
          .settings = "",
          .isComplete = has("poses/database.db"),
-         .run = [this](bool resumes) { return features(resumes); }},
+         .discard = [this] { reconstruction_->discardFeatures(); },
+         .run = [this](bool) { return features(); }},
         {.name = "pairs",
          .settings = "",
          .isComplete = has("poses/pairs.json"),
@@ -63,14 +65,15 @@ class PhotoRun {
         {.name = "train",
          .settings = fmt::format("--method {} {}", options_.method, training),
          .isComplete = has("model/manifest.json"),
-         .run = [this](bool resumes) { return train(resumes); }},
+         .discard = [this] { setModelAside(); },
+         .run = [this](bool) { return train(); }},
         {.name = "bake",
          .settings = "",
          .isComplete = has("scene/tileset.json"),
          .run = [this](bool) { return bake(); }},
         {.name = "evaluate",
          .settings = "",
-         .isComplete = has("eval.json"),
+         .isComplete = [this] { return options_.holdout == "none" || has("eval.json")(); },
          .run = [this](bool) { return evaluate(); }},
     };
   }
@@ -101,11 +104,7 @@ class PhotoRun {
                            list_.leftOut.size(), list_.bodies.size(), list_.flights)};
   }
 
-  StageOutcome features(bool resumes) {
-    std::error_code status;
-    if (!resumes)
-      for (const char* name : {"poses/database.db", "poses/database.db-wal", "poses/database.db-shm"})
-        fs::remove(out(name), status);
+  StageOutcome features() {
     Progress progress("features", static_cast<int64_t>(list_.photos.size()), "photos");
     reconstruction_->extractFeatures([&](int64_t done) { progress.update(done); });
     return {reconstruction_->peakBytes(), fmt::format("{} photos", list_.photos.size())};
@@ -173,14 +172,17 @@ class PhotoRun {
   }
 
   // A model that was trained on something else or in another way is kept beside the new one.
-  StageOutcome train(bool resumes) {
+  void setModelAside() {
     std::error_code status;
-    if (!resumes && fs::exists(out("model"), status)) {
-      fs::remove_all(out("model.earlier"), status);
-      fs::rename(out("model"), out("model.earlier"), status);
-      if (status) throw Error(out("model").string(), "", "cannot be renamed: " + status.message(), "check the disk");
-      inform("{} is kept as {}", out("model").string(), out("model.earlier").string());
-    }
+    if (!fs::exists(out("model"), status)) return;
+    fs::path earlier = out("model.earlier");
+    for (int i = 2; fs::exists(earlier, status); ++i) earlier = out("model.earlier-") += std::to_string(i);
+    fs::rename(out("model"), earlier, status);
+    if (status) throw Error(out("model").string(), "", "cannot be renamed: " + status.message(), "check the disk");
+    inform("{} is kept as {}", out("model").string(), earlier.string());
+  }
+
+  StageOutcome train() {
     std::vector<std::string> arguments{out("capture").string(), out("model").string(), "--method", options_.method,
                                        "--resume"};
     if (options_.steps > 0) {
@@ -196,6 +198,7 @@ class PhotoRun {
   }
 
   StageOutcome evaluate() {
+    if (options_.holdout == "none") return {0, "no photo is held out"};
     StageOutcome outcome = runVerb("eval", {out("scene").string(), out("capture").string(), "--json",
                                             out("eval.json").string(), "--report", out("report.html").string()});
     const Json result = Json::parse(readTextFile(out("eval.json")));
@@ -215,9 +218,16 @@ void runFromPhotos(const PhotoRunOptions& options) {
   std::error_code status;
   if (!fs::is_directory(options.photos, status))
     throw Error(options.photos.string(), "", "is not a folder", "name a folder of photos");
-  const fs::path inside = fs::weakly_canonical(options.out).lexically_relative(fs::weakly_canonical(options.photos));
+  const fs::path inside = fs::weakly_canonical(fs::absolute(options.out))
+                              .lexically_relative(fs::weakly_canonical(fs::absolute(options.photos)));
   if (!inside.empty() && *inside.begin() != "..") {
     throw Error(options.out.string(), "", "is the folder of photos, or in it: its pictures would be taken for photos",
+                "name another folder to write to");
+  }
+  checkHoldOut(options.holdout);
+  for (const char* name : {"poses", "capture", "model", "scene"}) {
+    if (!fs::exists(options.out / name, status) || fs::exists(options.out / "run.json", status)) continue;
+    throw Error((options.out / name).string(), "", "was not made by such a run, and would be replaced",
                 "name another folder to write to");
   }
   const FolderLock lock(options.out);

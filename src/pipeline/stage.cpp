@@ -58,6 +58,11 @@ Json toJson(const std::string& name, const Record& result) {
           {"summary", result.summary}};
 }
 
+// Names of files need not be UTF-8.
+void write(const Json& run, const fs::path& file) {
+  writeFileAtomically(file, run.dump(2, ' ', false, Json::error_handler_t::replace) + "\n", true);
+}
+
 std::string describeSeconds(double seconds) {
   const auto whole = static_cast<int64_t>(seconds + 0.5);
   return fmt::format("{}:{:02}", whole / 60, whole % 60);
@@ -103,12 +108,18 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
     } else {
       // Results of later stages end with those of this one, also if it is interrupted.
       again = true;
+      // What it left is discarded before the record says that the stage may be resumed.
+      const bool resumes = isKnown && !known->second.isFinished;
       result.digest = digest;
+      if (!resumes) {
+        write(run, file);
+        stage.discard();
+      }
       Json begun = run;
       begun["stages"].push_back(toJson(stage.name, result));
-      writeFileAtomically(file, begun.dump(2) + "\n", true);
+      write(begun, file);
       const auto start = std::chrono::steady_clock::now();
-      const StageOutcome outcome = stage.run(isKnown && !known->second.isFinished);
+      const StageOutcome outcome = stage.run(resumes);
       result.isFinished = true;
       result.summary = outcome.summary;
       result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -117,7 +128,7 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
     }
     std::fflush(stdout);
     run["stages"].push_back(toJson(stage.name, result));
-    if (again) writeFileAtomically(file, run.dump(2) + "\n", true);
+    if (again) write(run, file);
     if (stage.name == range.until) break;
   }
 }

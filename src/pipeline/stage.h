@@ -20,6 +20,8 @@ struct Stage {
   std::string name;
   std::string settings;  // what its result depends on, besides the results of earlier stages
   std::function<bool()> isComplete = [] { return true; };  // whether what it wrote is still there
+  // Removes what a result for other settings has left, which `run` must not use; called before it begins anew.
+  std::function<void()> discard = [] {};
   // `resumes`: it was interrupted, and nothing that its result depends on has changed since: what it has written so far
   // may be used.
   std::function<StageOutcome(bool resumes)> run;

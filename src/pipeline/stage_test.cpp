@@ -20,6 +20,11 @@ class Stages : public testing::Test {
       stages.push_back({.name = name,
                         .settings = settings[i],
                         .isComplete = [this, name] { return name != lost_; },
+                        .discard =
+                            [this, name] {
+                              discarded_ += name + " ";
+                              record_ = readTextFile(folder_ / "run.json");
+                            },
                         .run =
                             [this, &ran, name](bool resumes) {
                               if (name == failing_) throw Error(name, "", "fails", "repair it");
@@ -37,7 +42,32 @@ class Stages : public testing::Test {
 
   TemporaryFolder folder_;
   std::string lost_, failing_;
+  std::string discarded_, record_;  // which stages discarded what they had left, and run.json at the last of these
 };
+
+TEST_F(Stages, DiscardWhatTheyLeftBeforeTheyMayBeResumed) {
+  run({"", "", ""});
+  EXPECT_EQ(discarded_, "one two three ");
+  discarded_.clear();
+  failing_ = "two";
+  run({"", "x", ""});
+  EXPECT_EQ(discarded_, "two ");
+  EXPECT_EQ(record_.find("two"), record_.npos) << "killed here, the stage would be resumed with what it had left";
+  run({"", "x", ""});
+  EXPECT_EQ(discarded_, "two ") << "a stage that is resumed keeps it";
+}
+
+TEST_F(Stages, HaveNamesThatNeedNotBeUtf8) {
+  const auto stage = [] {
+    return StageOutcome{0,
+                        "photos of S\xfc"
+                        "dstadt"};
+  };
+  EXPECT_NO_THROW(runStages(folder_.path(),
+                            "run S\xfc"
+                            "d",
+                            {{.name = "one", .run = [&](bool) { return stage(); }}}, {}));
+}
 
 TEST_F(Stages, AreNotRepeated) {
   EXPECT_EQ(run({"", "", ""}), "one two three ");

@@ -22,10 +22,11 @@ size_t bigEndian16(std::span<const std::byte> bytes, size_t at) {
 Bytes encodeXmpSegment(const XmpFields& f) {
   const Vec3d right = f.worldFromCamera.col(0), down = f.worldFromCamera.col(1), forward = f.worldFromCamera.col(2);
   const double pitch = std::asin(std::clamp(forward.z(), -1.0, 1.0));
-  // Straight down, the upper edge of the picture says where the camera faces.
-  const Vec3d ahead = std::abs(forward.z()) > std::sin(80 * kRadiansPerDegree) ? Vec3d(-down) : forward;
+  // Straight down, the upper edge of the picture says where the camera faces, and roll is a part of the yaw.
+  const bool isSteep = std::abs(forward.z()) > std::sin(80 * kRadiansPerDegree);
+  const Vec3d ahead = isSteep ? Vec3d(-down) : forward;
   const double yaw = std::atan2(ahead.x(), ahead.y());
-  const double roll = std::asin(std::clamp(-right.z(), -1.0, 1.0));
+  const double roll = isSteep ? 0 : std::atan2(-right.z(), -down.z());
   const std::string text = fmt::format(
       "<?xpacket begin=\"\xef\xbb\xbf\" id=\"W5M0MpCehiHzreSzNTczkc9d\"?>\n"
       "<x:xmpmeta xmlns:x=\"adobe:ns:meta/\">\n"

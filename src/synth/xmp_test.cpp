@@ -36,7 +36,7 @@ TEST(Xmp, GivesTheAnglesOfTheGimbal) {
     ASSERT_TRUE(tags.gimbal);
     EXPECT_NEAR(tags.gimbal->yaw, expected.yaw, 0.01);
     EXPECT_NEAR(tags.gimbal->pitch, expected.pitch, 0.01);
-    EXPECT_NEAR(tags.gimbal->roll, expected.roll, 1.1) << "level axes tilt with the camera";
+    EXPECT_NEAR(tags.gimbal->roll, expected.roll, 0.01);
   }
 }
 
