@@ -124,34 +124,37 @@ void improve(const Fixes& fixes, const std::vector<size_t>& corrected, Fit& fit)
   for (size_t f = 0; f < corrected.size(); ++f) fit.tooHigh[corrected[f]] = change[static_cast<Eigen::Index>(7 + f)];
 }
 
-// Corrects flights whose altitudes clearly differ from those of the reference flight: of all fixes in the order of
-// their flights' heights, it has the middle one. Only these are corrected: heights that were free for every flight
-// would let the world tilt.
+// Corrects flights whose altitudes clearly differ from those of the median flight; of two in the middle, from those of
+// the one with more fixes. Only these are corrected: heights that were free for every flight would let the world tilt.
 void correctFlights(const Fixes& fixes, Fit& fit) {
   const std::vector<std::optional<double>> heights = heightsAbove(fixes, fit);
   std::vector<std::pair<double, size_t>> order;  // height, number of fixes
-  size_t all = 0;
   for (size_t f = 0; f < heights.size(); ++f) {
     if (!heights[f]) continue;
     order.emplace_back(*heights[f], fixes.ofFlight[f].size());
-    all += fixes.ofFlight[f].size();
   }
   if (order.size() < 2) return;
   std::sort(order.begin(), order.end());
-  size_t reference = 0;
-  for (size_t before = order[0].second; 2 * before < all; before += order[++reference].second) {
-  }
-  const double standard = order[reference].first;
+  const auto &lower = order[(order.size() - 1) / 2], &upper = order[order.size() / 2];
+  const double standard = lower.second >= upper.second ? lower.first : upper.first;
   std::vector<size_t> corrected;
   for (size_t f = 0; f < heights.size(); ++f)
     if (heights[f] && std::abs(*heights[f] - standard) > kLeastHeightError) corrected.push_back(f);
   if (corrected.empty()) return;
   fit.enuFromWorld(2, 3) += standard;
-  constexpr int kRounds = 8;
   for (const size_t f : corrected) fit.tooHigh[f] = *heights[f] - standard;
-  for (int round = 0; round < kRounds; ++round) {
-    judge(fixes, fit);
-    improve(fixes, corrected, fit);
+  while (true) {
+    constexpr int kRounds = 8;
+    for (int round = 0; round < kRounds; ++round) {
+      judge(fixes, fit);
+      improve(fixes, corrected, fit);
+    }
+    // The first fit may have followed a flight that is wrong, and made others seem to be.
+    const size_t before = corrected.size();
+    for (const size_t f : corrected)
+      if (std::abs(fit.tooHigh[f]) <= kLeastHeightError) fit.tooHigh[f] = 0;
+    std::erase_if(corrected, [&](size_t f) { return fit.tooHigh[f] == 0; });
+    if (corrected.size() == before) break;
   }
   judge(fixes, fit);
 }
