@@ -52,7 +52,14 @@ void addRunVerb(CLI::App& app) {
       ->check(CLI::Range(0, 1024));
   verb->callback([options] {
     options->program = fs::read_symlink("/proc/self/exe").string();
-    runFromPhotos(*options);
+    options->interrupted = interrupted;
+    catchInterrupts();
+    try {
+      runFromPhotos(*options);
+    } catch (const RunInterrupted&) {
+      std::fprintf(stderr, "interrupted; run the same command again to go on\n");
+      throw CLI::RuntimeError(interruptedStatus());
+    }
   });
 }
 

@@ -19,6 +19,11 @@
 #include "base/check.h"
 
 namespace tessera {
+namespace {
+
+constexpr int kUnknownEnd = 1 << 8;  // of a program that something else has waited for: status 1
+
+}  // namespace
 
 void Descriptor::reset(int value) {
   close();
@@ -54,6 +59,7 @@ std::string ChildProcess::start(std::vector<std::string> arguments, const ChildO
   if (process == 0) {
     // Other threads do not exist here and may have held any lock: only system calls.
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    ::setpgid(0, 0);
     if (::getppid() == parent && ::dup2(input, STDIN_FILENO) >= 0 && ::dup2(messages_.get(), STDOUT_FILENO) >= 0 &&
         ::dup2(messages_.get(), STDERR_FILENO) >= 0) {
       ::execvp(pointers[0], pointers.data());
@@ -82,7 +88,8 @@ bool ChildProcess::waitFor(double seconds) {
   while (!ended_) {
     rusage usage{};
     const pid_t ended = ::wait4(process_, &status_, WNOHANG, &usage);
-    ended_ = ended == process_;
+    if (ended < 0 && errno != EINTR) status_ = kUnknownEnd;
+    ended_ = ended == process_ || (ended < 0 && errno != EINTR);
     if (ended_) peakBytes_ = int64_t{usage.ru_maxrss} << 10;
     if (ended_ || steady_clock::now() >= end) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -94,8 +101,10 @@ std::string ChildProcess::wait() {
   CHECK(isRunning());
   if (!ended_) {
     rusage usage{};
-    while (::wait4(process_, &status_, 0, &usage) < 0 && errno == EINTR) {
+    pid_t ended = -1;
+    while ((ended = ::wait4(process_, &status_, 0, &usage)) < 0 && errno == EINTR) {
     }
+    if (ended < 0) status_ = kUnknownEnd;
     peakBytes_ = int64_t{usage.ru_maxrss} << 10;
   }
   process_ = -1;
@@ -103,6 +112,10 @@ std::string ChildProcess::wait() {
   if (WIFSIGNALED(status_)) return fmt::format("was ended by signal {}", WTERMSIG(status_));
   if (!WIFEXITED(status_) || WEXITSTATUS(status_) == 0) return "";
   return fmt::format("ended with status {}", WEXITSTATUS(status_));
+}
+
+void ChildProcess::interrupt() {
+  if (isRunning() && !ended_) ::kill(process_, SIGINT);
 }
 
 void ChildProcess::kill() {

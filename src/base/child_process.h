@@ -1,5 +1,6 @@
 // A program that runs beside this one, never through a shell: its arguments are passed as they are. It is killed when
-// the thread that started it ends, whatever ends it: no program is left behind.
+// the thread that started it ends, whatever ends it: no program is left behind. It has a process group of its own, so
+// that Ctrl-C on a terminal reaches it only through `interrupt`.
 #pragma once
 
 #include <sys/types.h>
@@ -48,6 +49,7 @@ class ChildProcess {
   bool waitFor(double seconds);
   // Waits for its end. Returns an empty text if it reported success, else how it ended.
   std::string wait();
+  void interrupt();  // sends SIGINT
   void kill();
   // The end of what it wrote to its standard output and error output.
   std::string lastWords(size_t bytes = 400) const;

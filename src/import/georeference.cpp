@@ -5,6 +5,7 @@
 #include <Eigen/Dense>
 #include <GeographicLib/LocalCartesian.hpp>
 #include <algorithm>
+#include <numbers>
 
 #include "base/check.h"
 #include "base/order_statistics.h"
@@ -90,14 +91,21 @@ std::vector<std::optional<double>> heightsAbove(const Fixes& fixes, const Fit& f
   return heights;
 }
 
+// What a step of Gauss and Newton has found.
+struct Step {
+  Vec3d middle = Vec3d::Zero();  // of the fixes, about which rotation and scale turn
+  Eigen::MatrixXd covariance;    // of rotation (3), scale, translation (3) and heights, for the given deviations
+};
+
 // A step of Gauss and Newton on the similarity and the heights of the flights `corrected` together: in turns, they
-// would converge slowly where flights lie side by side.
-void improve(const Fixes& fixes, const std::vector<size_t>& corrected, Fit& fit) {
-  if (fit.inliers.size() < 3) return;
+// would converge slowly where flights lie side by side. `deviations`: of the coordinates of fixes, metres.
+Step improve(const Fixes& fixes, const std::vector<size_t>& corrected, const Vec3d& deviations, Fit& fit) {
+  Step step;
+  if (fit.inliers.size() < 3) return step;
   const Points mapped =
       (fit.enuFromWorld * selectColumns(fixes.world, fit.inliers).colwise().homogeneous()).topRows<3>();
   const Vec3d middle = mapped.rowwise().mean();
-  // Unknowns: rotation and scale about the middle, translation, heights.
+  const Mat3d weights = deviations.cwiseAbs2().cwiseInverse().asDiagonal();
   const auto unknowns = static_cast<Eigen::Index>(7 + corrected.size());
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(unknowns, unknowns);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(unknowns);
@@ -110,18 +118,22 @@ void improve(const Fixes& fixes, const std::vector<size_t>& corrected, Fit& fit)
     row.middleCols<3>(4) = Mat3d::Identity();
     const auto of = std::find(corrected.begin(), corrected.end(), static_cast<size_t>(fixes.flight[fix]));
     if (of != corrected.end()) row(2, 7 + (of - corrected.begin())) = 1;
-    normal += row.transpose() * row;
-    right += row.transpose() * (fixes.enu.col(static_cast<Eigen::Index>(fix)) - mapped.col(k));
+    normal += row.transpose() * weights * row;
+    right += row.transpose() * weights * (fixes.enu.col(static_cast<Eigen::Index>(fix)) - mapped.col(k));
   }
-  const Eigen::VectorXd change = normal.completeOrthogonalDecomposition().solve(right);
+  const auto solver = normal.completeOrthogonalDecomposition();
+  const Eigen::VectorXd change = solver.solve(right);
   const Vec3d rotation = change.head<3>();
-  Mat4d step = Mat4d::Identity();
+  Mat4d moved = Mat4d::Identity();
   const Mat3d turn = rotation.norm() > 0 ? Eigen::AngleAxisd(rotation.norm(), rotation.normalized()).toRotationMatrix()
                                          : Mat3d::Identity();
-  step.topLeftCorner<3, 3>() = std::exp(change[3]) * turn;
-  step.topRightCorner<3, 1>() = middle + change.segment<3>(4) - step.topLeftCorner<3, 3>() * middle;
-  fit.enuFromWorld = step * fit.enuFromWorld;
+  moved.topLeftCorner<3, 3>() = std::exp(change[3]) * turn;
+  moved.topRightCorner<3, 1>() = middle + change.segment<3>(4) - moved.topLeftCorner<3, 3>() * middle;
+  fit.enuFromWorld = moved * fit.enuFromWorld;
   for (size_t f = 0; f < corrected.size(); ++f) fit.tooHigh[corrected[f]] = change[static_cast<Eigen::Index>(7 + f)];
+  step.middle = middle;
+  step.covariance = solver.pseudoInverse();
+  return step;
 }
 
 // Corrects flights whose altitudes clearly differ from those of the median flight; of two in the middle, from those of
@@ -147,7 +159,7 @@ void correctFlights(const Fixes& fixes, Fit& fit) {
     constexpr int kRounds = 8;
     for (int round = 0; round < kRounds; ++round) {
       judge(fixes, fit);
-      improve(fixes, corrected, fit);
+      improve(fixes, corrected, Vec3d::Ones(), fit);
     }
     // The first fit may have followed a flight that is wrong, and made others seem to be.
     const size_t before = corrected.size();
@@ -159,7 +171,108 @@ void correctFlights(const Fixes& fixes, Fit& fit) {
   judge(fixes, fit);
 }
 
+// Moves fixes and fit up together.
+void raise(Fixes& fixes, Fit& fit, double metres) {
+  fixes.enu.row(2).array() += metres;
+  fit.enuFromWorld(2, 3) += metres;
+}
+
+// Returns the height of absolute altitudes above the fit, the median of photos of flights that were not corrected.
+// Flights that took off elsewhere have other heights above take-off, whose mean says little.
+double medianRise(const GeoFrame& frame, const std::vector<const Photo*>& photos, const Fixes& fixes, const Fit& fit) {
+  const Points mapped = (fit.enuFromWorld * fixes.world.colwise().homogeneous()).topRows<3>();
+  std::vector<double> rises;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    if (fit.tooHigh[static_cast<size_t>(fixes.flight[i])] != 0) continue;
+    const GpsFix& gps = *photos[i]->gps;
+    rises.push_back(enuFromGps(frame, gps.latitude, gps.longitude, gps.altitude).z() -
+                    mapped(2, static_cast<Eigen::Index>(i)));
+  }
+  return rises.empty() ? 0 : upperMedian(rises);
+}
+
+// Returns what fixes differ from the fit by, for all of them.
+Points differences(const Fixes& fixes, const Fit& fit) {
+  return fixes.corrected(fit.tooHigh) - (fit.enuFromWorld * fixes.world.colwise().homogeneous()).topRows<3>();
+}
+
+// Returns the standard deviations of the coordinates of a fix. Medians: the tolerance of inliers is wide.
+Vec3d estimateDeviations(const Points& residuals, const std::vector<int>& inliers, size_t unknowns) {
+  constexpr size_t kFew = 12;
+  constexpr double kLeast = 0.05;                            // metres
+  constexpr double kMedianOfTwo = 1.1774, kMedian = 0.6745;  // of the length of two, and of one normal variable
+  const auto n = static_cast<double>(inliers.size());
+  const double free = 3 * n - static_cast<double>(unknowns);
+  const double factor = free > 0 ? std::sqrt(3 * n / free) : 1;
+  if (inliers.size() < kFew) {
+    const double rms = selectColumns(residuals, inliers).norm() / std::sqrt(3 * n);
+    return Vec3d::Constant(std::max(kLeast, factor * rms));
+  }
+  std::vector<double> across, up;
+  for (const int i : inliers) {
+    across.push_back(residuals.col(i).head<2>().norm());
+    up.push_back(std::abs(residuals(2, i)));
+  }
+  const double horizontal = std::max(kLeast, factor * upperMedian(across) / kMedianOfTwo);
+  return {horizontal, horizontal, std::max(kLeast, factor * upperMedian(up) / kMedian)};
+}
+
+// Fits the heights that the fixes exceed the poses by with a plane and the square of the distance from the middle.
+std::optional<Georeference::Bend> findBend(const Points& places, const Points& residuals) {
+  constexpr Eigen::Index kUnknowns = 4, kLeast = 12;
+  const Eigen::Index n = places.cols();
+  if (n < kLeast) return std::nullopt;
+  const Vec3d middle = places.rowwise().mean();
+  const Points centred = places.colwise() - middle;
+  const double farthest = centred.topRows<2>().colwise().norm().maxCoeff();
+  Eigen::MatrixXd basis(n, kUnknowns);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vec2d at = centred.col(i).head<2>() / farthest;
+    basis.row(i) << 1, at.x(), at.y(), at.squaredNorm();
+  }
+  const auto solver = (basis.transpose() * basis).completeOrthogonalDecomposition();
+  if (solver.rank() < kUnknowns) return std::nullopt;
+  const Eigen::VectorXd heights = residuals.row(2).transpose();
+  const Eigen::VectorXd solution = solver.solve(basis.transpose() * heights);
+  const double variance = (heights - basis * solution).squaredNorm() / static_cast<double>(n - kUnknowns);
+  return Georeference::Bend{solution[3], std::sqrt(variance * solver.pseudoInverse()(3, 3))};
+}
+
+// Improves the fit with fixes weighted by their deviations, and states how well it is determined.
+void finish(const Fixes& fixes, Fit& fit, Georeference& result) {
+  std::vector<size_t> corrected;
+  for (size_t f = 0; f < fit.tooHigh.size(); ++f)
+    if (fit.tooHigh[f] != 0) corrected.push_back(f);
+  const size_t unknowns = 7 + corrected.size();
+  Vec3d deviations = Vec3d::Ones();
+  Step step;
+  constexpr int kRounds = 4;
+  for (int round = 0; round < kRounds; ++round) {
+    deviations = estimateDeviations(differences(fixes, fit), fit.inliers, unknowns);
+    step = improve(fixes, corrected, deviations, fit);
+    judge(fixes, fit);
+  }
+  if (step.covariance.size() == 0) return;
+  result.horizontalDeviation = deviations.x();
+  result.verticalDeviation = deviations.z();
+  const auto& c = step.covariance;
+  result.scaleError = std::sqrt(c(3, 3));
+  result.rotationError = std::sqrt(c.topLeftCorner<3, 3>().trace()) * 180 / std::numbers::pi;
+  result.middleError = std::sqrt(c.block<3, 3>(4, 4).trace());
+  const Points residuals = differences(fixes, fit);
+  result.bend = findBend(selectColumns(fixes.enu, fit.inliers), selectColumns(residuals, fit.inliers));
+  for (Eigen::Index i = 0; i < residuals.cols(); ++i) {
+    const bool isInlier = std::binary_search(fit.inliers.begin(), fit.inliers.end(), static_cast<int>(i));
+    result.residuals.push_back({static_cast<int>(i), residuals.col(i), deviations, isInlier});
+  }
+}
+
 }  // namespace
+
+bool Georeference::isBent() const {
+  constexpr double kErrors = 4, kLeastMetres = 0.5;
+  return bend && std::abs(bend->metres) > std::max(kErrors * bend->error, kLeastMetres);
+}
 
 Vec3d enuFromGps(const GeoFrame& frame, double latitude, double longitude, double altitude) {
   const GeographicLib::LocalCartesian local(frame.latitude, frame.longitude, frame.altitude);
@@ -236,7 +349,13 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
     for (int round = 0; round < 3; ++round) refine(fixes, fit);
     if (fit.inliers.size() > best.inliers.size()) best = std::move(fit);
   }
-  if (best.inliers.size() >= 3) correctFlights(fixes, best);
+  if (best.inliers.size() >= 3) {
+    correctFlights(fixes, best);
+    if (allRelative) raise(fixes, best, medianRise(result.frame, fixed, fixes, best));
+    finish(fixes, best, result);
+    for (Georeference::Residual& residual : result.residuals)
+      residual.photo = static_cast<int>(fixed[static_cast<size_t>(residual.photo)] - photos.data());
+  }
   if (best.inliers.size() < 3 || 2 * static_cast<int>(best.inliers.size()) < n ||
       isLine(selectColumns(world, best.inliers))) {
     reason = fmt::format("only {} of {} GPS fixes agree with the poses to within {} m", best.inliers.size(), n,
@@ -246,10 +365,8 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
   result.frame.enuFromWorld = best.enuFromWorld;
   result.heightsTooHigh = best.tooHigh;
   result.inliers = static_cast<int>(best.inliers.size());
-  const Points from = selectColumns(world, best.inliers),
-               to = selectColumns(fixes.corrected(best.tooHigh), best.inliers);
-  const Points residual = (result.frame.enuFromWorld * from.colwise().homogeneous()).topRows<3>() - to;
-  result.rmsMetres = residual.norm() / std::sqrt(static_cast<double>(best.inliers.size()));
+  const Points residuals = selectColumns(differences(fixes, best), best.inliers);
+  result.rmsMetres = residuals.norm() / std::sqrt(static_cast<double>(best.inliers.size()));
   if (result.rmsMetres > spread / 3) {
     reason = fmt::format("the GPS fixes deviate from the poses by {:.1f} m, over a spread of {:.1f} m",
                          result.rmsMetres, spread);

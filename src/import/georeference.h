@@ -13,10 +13,32 @@
 namespace tessera {
 
 struct Georeference {
+  struct Residual {
+    int photo = 0;                 // index into the photos
+    Vec3d metres = Vec3d::Zero();  // east, north and up, of the fix from the pose; the height of its flight corrected
+    Vec3d predicted = Vec3d::Zero();  // their standard deviations
+    bool isInlier = false;
+  };
+  // How the heights of the fixes bend from the middle of the photos to the farthest: metres, and their standard error.
+  struct Bend {
+    double metres = 0, error = 0;
+  };
+
   GeoFrame frame;  // origin: the mean of the photos' fixes; enuFromWorld: the similarity
   int inliers = 0, fixes = 0;
   double rmsMetres = 0;                // of the inliers, in three dimensions
   std::vector<double> heightsTooHigh;  // by flight: metres by which its altitudes are too high, corrected
+  std::vector<Residual> residuals;     // of all fixes
+  // Standard deviations of a fix, metres: of each horizontal coordinate, and of the height, from the residuals.
+  double horizontalDeviation = 0, verticalDeviation = 0;
+  // Standard errors of the similarity, if the errors of fixes are independent (those of a flight seldom are: it is then
+  // off by what they share): relative, degrees, and metres at the middle of the photos.
+  double scaleError = 0, rotationError = 0, middleError = 0;
+  std::optional<Bend> bend;  // nothing if there are too few photos to tell
+
+  // Whether the heights bend by more than the errors of fixes explain. The poses then form a dome or a bowl, as those
+  // of photos that all look straight down do if the lens is not known.
+  bool isBent() const;
 };
 
 inline constexpr double kGpsTolerance = 8;  // metres
@@ -26,10 +48,10 @@ inline constexpr double kMinGpsSpread = 5;  // metres
 // `reason`, if there are fewer than three fixes, if they lie on one line (the rotation about it is undetermined) or too
 // near one (standard deviation across it below kMinGpsSpread, where the fit would follow noise), if fewer than half of
 // them agree within kGpsTolerance, or if the residual exceeds a third of that deviation. Altitudes are the drone's
-// heights above take-off where every photo has one (its barometer is far more precise than GPS), shifted to the mean of
-// the absolute altitudes. `flights`: the flight of each photo, from 0 on; empty: all are of one. Altitudes of one
-// flight may be wrong by the same height (GPS jumps, and take-off places differ), which is estimated for flights of
-// three fixes or more.
+// heights above take-off where every photo has one (its barometer is far more precise than GPS), shifted to agree with
+// the median of the absolute altitudes. Horizontal coordinates and heights count by their deviations from the fit.
+// `flights`: the flight of each photo, from 0 on; empty: all are of one. Altitudes of one flight may be wrong by the
+// same height (GPS jumps, and take-off places differ), which is estimated for flights of three fixes or more.
 std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,
                                          std::string& reason);
 

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <GeographicLib/LocalCartesian.hpp>
+#include <cmath>
 
 #include "base/random.h"
 #include "import/georeference.h"
@@ -183,6 +185,114 @@ TEST(Orient, KeepsTheAltitudesOfTheLargerOfTwoFlights) {
   ASSERT_EQ(fit->heightsTooHigh.size(), 2u);
   EXPECT_NEAR(fit->heightsTooHigh[0], -15, 0.1);
   EXPECT_EQ(fit->heightsTooHigh[1], 0);
+}
+
+// Surveys of 7 × 8 photos at two heights, with normally distributed errors of GPS of 2 m, and 0.5 m in height.
+class NoisySurvey {
+ public:
+  explicit NoisySurvey(uint64_t seed) : random_(seed, 5) {
+    const GeographicLib::LocalCartesian local(50, 8, 100);
+    for (int i = 0; i < 56; ++i) {
+      Photo photo;
+      const Vec3d at(30.0 * (i % 7), 25.0 * static_cast<int>(i / 7), i % 2 == 0 ? 60 : 100);
+      photo.worldFromCamera = nadirPose(at, 0);
+      GpsFix fix;
+      const double x = at.x() + 2 * normal(), y = at.y() + 2 * normal(), z = at.z() + 0.5 * normal();
+      local.Reverse(x, y, z, fix.latitude, fix.longitude, fix.altitude);
+      photo.gps = fix;
+      source.capture.photos.push_back(photo);
+    }
+  }
+  // Lifts the poses by so many metres at the farthest photos from the middle, as the square of the distance.
+  void bend(double metres) {
+    for (Photo& photo : source.capture.photos) {
+      Vec3d& at = photo.worldFromCamera.translation;
+      at.z() += metres * (at.head<2>() - Vec2d(90, 87.5)).squaredNorm() / Vec2d(90, 87.5).squaredNorm();
+    }
+  }
+  Georeference fit() {
+    scramble(source);
+    std::string reason;
+    const auto georeferenced = georeference(source.capture.photos, {}, reason);
+    EXPECT_TRUE(georeferenced.has_value()) << reason;
+    return georeferenced.value_or(Georeference{});
+  }
+
+  SourceCapture source;
+
+ private:
+  double normal() {  // by the central limit theorem
+    double sum = -6;
+    for (int i = 0; i < 12; ++i) sum += random_.uniformDouble(draw_++);
+    return sum;
+  }
+
+  RandomStream random_;
+  uint64_t draw_ = 0;
+};
+
+TEST(Georeference, PredictsItsErrors) {
+  constexpr int kTrials = 60;
+  double scale = 0, rotation = 0, middle = 0, predictedScale = 0, predictedRotation = 0, predictedMiddle = 0;
+  double horizontal = 0, vertical = 0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    NoisySurvey survey(static_cast<uint64_t>(trial) + 1);
+    const Mat3d trueRotation = survey.source.capture.photos[0].worldFromCamera.rotation;
+    const Georeference fit = survey.fit();
+    EXPECT_EQ(fit.residuals.size(), 56u);
+    const Capture& capture = survey.source.capture;
+    const Mat3d linear = fit.frame.enuFromWorld.topLeftCorner<3, 3>();
+    const double metres = std::cbrt(linear.determinant());
+    scale += std::pow(metres * 0.07 - 1, 2);
+    const Mat3d turned = linear / metres * capture.photos[0].worldFromCamera.rotation;
+    rotation += std::pow(Eigen::AngleAxisd(turned * trueRotation.transpose()).angle() * 180 / M_PI, 2);
+    // The frame's origin is the mean of the fixes: its place on the first survey's plane is that of the noise.
+    Vec3d sum = Vec3d::Zero();
+    for (const Photo& photo : capture.photos)
+      sum += (fit.frame.enuFromWorld * photo.worldFromCamera.translation.homogeneous()).head<3>();
+    const GeographicLib::LocalCartesian local(50, 8, 100);
+    Vec3d origin;
+    local.Forward(fit.frame.latitude, fit.frame.longitude, fit.frame.altitude, origin.x(), origin.y(), origin.z());
+    middle += (sum / 56 + origin - Vec3d(90, 87.5, 80)).squaredNorm();
+    predictedScale += fit.scaleError * fit.scaleError;
+    predictedRotation += fit.rotationError * fit.rotationError;
+    predictedMiddle += fit.middleError * fit.middleError;
+    horizontal += fit.horizontalDeviation / kTrials;
+    vertical += fit.verticalDeviation / kTrials;
+  }
+  EXPECT_NEAR(horizontal, 2, 0.15);
+  EXPECT_NEAR(vertical, 0.5, 0.05);
+  EXPECT_NEAR(std::sqrt(scale / predictedScale), 1, 0.25);
+  EXPECT_NEAR(std::sqrt(rotation / predictedRotation), 1, 0.25);
+  EXPECT_NEAR(std::sqrt(middle / predictedMiddle), 1, 0.25);
+}
+
+TEST(Georeference, SaysIfPosesBend) {
+  for (uint64_t seed = 1; seed <= 40; ++seed) EXPECT_FALSE(NoisySurvey(seed).fit().isBent()) << seed;
+  NoisySurvey dome(3);
+  dome.bend(-3);
+  const Georeference fit = dome.fit();
+  EXPECT_TRUE(fit.isBent());
+  ASSERT_TRUE(fit.bend.has_value());
+  EXPECT_NEAR(fit.bend->metres, 3, 3 * fit.bend->error) << "fixes stand higher than poses far from the middle";
+}
+
+// The second flight took off 15 m higher: heights above take-off alone would be lower by half of that.
+TEST(Georeference, TakesTheLevelFromAbsoluteAltitudes) {
+  SourceCapture source = flight();
+  for (size_t i = 0; i < 20; ++i) {
+    source.flight.push_back(i < 8 ? 0 : 1);
+    GpsFix& gps = *source.capture.photos[i].gps;
+    gps.relativeAltitude = gps.altitude - 100 - (i < 8 ? 15 : 0);
+  }
+  scramble(source);
+  std::string reason;
+  const auto fit = georeference(source.capture.photos, source.flight, reason);
+  ASSERT_TRUE(fit.has_value()) << reason;
+  EXPECT_NEAR(fit->heightsTooHigh[0], -15, 0.1);
+  const Vec3d first =
+      (fit->frame.enuFromWorld * source.capture.photos[0].worldFromCamera.translation.homogeneous()).head<3>();
+  EXPECT_NEAR(first.z() + fit->frame.altitude, 160, 0.05);
 }
 
 TEST(Georeference, RejectsFixesThatDoNotDetermineARotation) {

@@ -96,6 +96,11 @@ std::map<int, int> ColmapDatabase::features() const {
   return counts;
 }
 
+void ColmapDatabase::removeMatches() {
+  for (const char* sql : {"BEGIN", "DELETE FROM matches", "DELETE FROM two_view_geometries", "COMMIT"})
+    state_->run(sql);
+}
+
 std::map<PhotoPair, int> ColmapDatabase::inliers() const {
   std::map<PhotoPair, int> counts;
   state_->query("SELECT pair_id, rows FROM two_view_geometries", {}, [&](sqlite3_stmt* s) {

@@ -28,6 +28,7 @@ class ColmapDatabase {
 
   // The numbers of features by photo, for photos that were looked at.
   std::map<int, int> features() const;
+  void removeMatches();
   // The numbers of matches that one geometry explains, for pairs that were compared.
   std::map<PhotoPair, int> inliers() const;
 

@@ -12,6 +12,13 @@ namespace tessera {
 
 inline constexpr const char* kColmapVersion = "3.8";
 
+struct ColmapSettings {
+  std::string program = "colmap";
+  int threads = 0;  // 0: all
+
+  std::string threadsText() const { return threads > 0 ? std::to_string(threads) : "-1"; }
+};
+
 class ColmapProgram {
  public:
   // `program` is looked up in PATH. Its output is appended to `log`. Throws Error if it cannot be run, or is of another

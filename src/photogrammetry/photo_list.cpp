@@ -79,6 +79,9 @@ std::string makeSafe(const std::string& name, std::set<std::string>& used) {
   for (char& c : safe) {
     if (!std::isalnum(static_cast<unsigned char>(c)) && c != '.' && c != '-' && c != '_') c = '_';
   }
+  // Room for a number: file systems allow 255 bytes.
+  constexpr size_t kLongest = 200;
+  if (safe.size() > kLongest) safe.erase(kLongest - 50, safe.size() - kLongest);
   const fs::path path(safe);
   for (int i = 2; !used.insert(safe).second; ++i)
     safe = fmt::format("{}_{}{}", path.stem().string(), i, path.extension().string());

@@ -8,18 +8,49 @@
 #include "base/child_process.h"
 #include "base/error.h"
 #include "base/log.h"
+#include "base/order_statistics.h"
 #include "base/progress.h"
+#include "import/georeference.h"
 #include "import/holdout.h"
 #include "import/importer.h"
 #include "photogrammetry/photo_list.h"
+#include "photogrammetry/photo_matches.h"
+#include "photogrammetry/photo_models.h"
 #include "photogrammetry/photo_pairs.h"
-#include "photogrammetry/reconstruction.h"
 #include "pipeline/folder_lock.h"
 
 namespace tessera {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// Names of photos need not be UTF-8.
+std::string dumpJson(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+Json toJson(const Georeference& fit, const std::vector<Photo>& photos) {
+  Json residuals = Json::array();
+  for (const Georeference::Residual& residual : fit.residuals) {
+    const auto metres = [](const Vec3d& x) { return Json{x.x(), x.y(), x.z()}; };
+    residuals.push_back({{"photo", photos[static_cast<size_t>(residual.photo)].name},
+                         {"metres", metres(residual.metres)},
+                         {"predicted", metres(residual.predicted)},
+                         {"agrees", residual.isInlier}});
+  }
+  Json json = {
+      {"fixes", fit.fixes},
+      {"agreeing", fit.inliers},
+      {"rms_metres", fit.rmsMetres},
+      {"deviation_metres", {{"horizontal", fit.horizontalDeviation}, {"vertical", fit.verticalDeviation}}},
+      {"standard_errors",
+       {{"scale", fit.scaleError}, {"rotation_degrees", fit.rotationError}, {"middle_metres", fit.middleError}}},
+      {"flights_too_high_metres", fit.heightsTooHigh},
+      {"residuals", std::move(residuals)}};
+  if (fit.bend)
+    json["bend"] = {{"metres", fit.bend->metres}, {"error", fit.bend->error}, {"significant", fit.isBent()}};
+  return json;
+}
 
 class PhotoRun {
  public:
@@ -32,8 +63,9 @@ class PhotoRun {
                   "name a folder of JPEG or PNG photos");
     }
     warnLeftOut(list_.leftOut);
-    reconstruction_ =
-        std::make_unique<Reconstruction>(out("poses"), list_, ReconstructionOptions{.threads = options.threads});
+    const ColmapSettings colmap{.threads = options.threads};
+    matches_ = std::make_unique<PhotoMatches>(out("poses"), list_, colmap);
+    models_ = std::make_unique<PhotoModels>(out("poses"), list_, colmap);
   }
 
   std::vector<Stage> stages() {
@@ -44,7 +76,7 @@ class PhotoRun {
         {.name = "features",
          .settings = "",
          .isComplete = has("poses/database.db"),
-         .discard = [this] { reconstruction_->discardFeatures(); },
+         .discard = [this] { matches_->discard(); },
          .run = [this](bool) { return features(); }},
         {.name = "pairs",
          .settings = "",
@@ -53,13 +85,27 @@ class PhotoRun {
         {.name = "matches",
          .settings = "",
          .isComplete = has("poses/database.db"),
+         .discard = [this] { matches_->discardMatches(); },
          .run = [this](bool) { return matches(); }},
         {.name = "mapping",
          .settings = "",
          .isComplete = has("poses/sparse"),
          .run = [this](bool resumes) { return mapping(resumes); }},
+        {.name = "remapping",
+         .settings = "",
+         .discard = [this] { models_->discardJoined(); },
+         .run = [this](bool resumes) { return remapping(resumes); }},
+        {.name = "adjusting",
+         .settings = "",
+         .isComplete = has("poses/adjusted"),
+         .discard = [this] { models_->discardAdjusted(); },
+         .run = [this](bool) { return adjusting(); }},
+        {.name = "georeferencing",
+         .settings = "",
+         .isComplete = has("poses/georeference.json"),
+         .run = [this](bool) { return georeferencing(); }},
         {.name = "capture",
-         .settings = fmt::format("{} {}", downscale(), options_.holdout),
+         .settings = fmt::format("{} {}", downscale(), describeHoldOut()),
          .isComplete = has("capture/transforms.json"),
          .run = [this](bool) { return capture(); }},
         {.name = "train",
@@ -87,6 +133,16 @@ class PhotoRun {
     };
   }
 
+  void stopIfInterrupted() const {
+    if (options_.interrupted()) throw RunInterrupted();
+  }
+  PhotoMatches::Watch watch(Progress& progress) const {
+    return [this, &progress](int64_t done) {
+      progress.update(done);
+      stopIfInterrupted();
+    };
+  }
+
   std::string describePhotos() const {
     std::string text;
     for (const ListedPhoto& photo : list_.photos) {
@@ -95,6 +151,13 @@ class PhotoRun {
                           fs::last_write_time(photo.file, status).time_since_epoch().count());
     }
     return textDigest(text);
+  }
+
+  // Of a list, also what it contains.
+  std::string describeHoldOut() const {
+    constexpr std::string_view kList = "list:";
+    const std::string& holdout = options_.holdout;
+    return holdout + (holdout.starts_with(kList) ? " " + textDigest(readTextFile(holdout.substr(kList.size()))) : "");
   }
 
   StageOutcome inspect() {
@@ -106,8 +169,8 @@ class PhotoRun {
 
   StageOutcome features() {
     Progress progress("features", static_cast<int64_t>(list_.photos.size()), "photos");
-    reconstruction_->extractFeatures([&](int64_t done) { progress.update(done); });
-    return {reconstruction_->peakBytes(), fmt::format("{} photos", list_.photos.size())};
+    matches_->extractFeatures(watch(progress));
+    return {matches_->takePeakBytes(), fmt::format("{} photos", list_.photos.size())};
   }
 
   StageOutcome pairs() {
@@ -119,35 +182,83 @@ class PhotoRun {
   StageOutcome matches() {
     const std::vector<PhotoPair> chosen = choosePairs(list_);
     Progress progress("matches", static_cast<int64_t>(chosen.size()), "pairs");
-    reconstruction_->match(chosen, [&](int64_t done) { progress.update(done); });
-    const size_t linked = reconstruction_->linkedPairs();
-    return {reconstruction_->peakBytes(), fmt::format("{} of {} pairs show the same places", linked, chosen.size())};
+    matches_->match(chosen, watch(progress));
+    const size_t linked = matches_->linkedPairs();
+    return {matches_->takePeakBytes(), fmt::format("{} of {} pairs show the same places", linked, chosen.size())};
+  }
+
+  std::string placedText(size_t unplaced) const {
+    return fmt::format("{} of {} photos", list_.photos.size() - unplaced, list_.photos.size());
   }
 
   StageOutcome mapping(bool resumes) {
     Progress progress("mapping", static_cast<int64_t>(list_.photos.size()), "photos");
-    reconstruction_->map(resumes, [&](int64_t done) { progress.update(done); });
-    if (const std::vector<int> missing = reconstruction_->unplacedPhotos(); !missing.empty()) {
+    models_->map(resumes, watch(progress));
+    const PhotoModels::Count count = models_->countMapped();
+    std::string summary = placedText(list_.photos.size() - count.photos);
+    if (count.models > 1) summary += fmt::format(", in {} models", count.models);
+    return {models_->takePeakBytes(), summary};
+  }
+
+  // A second round for what the first has left.
+  StageOutcome remapping(bool resumes) {
+    const int joined = resumes && has("poses/joined")() ? 0 : models_->join([this](int64_t) { stopIfInterrupted(); });
+    const std::vector<int> missing = models_->unplaced();
+    if (missing.empty() && joined == 0) return {0, "not needed"};
+    if (!missing.empty()) {
       inform("{} photos could not be placed; they are compared with more of the others", missing.size());
-      reconstruction_->match(chooseMorePairs(list_, missing), [](int64_t) {});
-      reconstruction_->extendMap([&](int64_t done) { progress.update(done); });
+      try {
+        Progress progress("remapping", static_cast<int64_t>(list_.photos.size()), "photos");
+        matches_->match(chooseMorePairs(list_, missing), [this](int64_t) { stopIfInterrupted(); });
+        models_->extend(resumes, watch(progress));
+      } catch (const Error& error) {
+        warn("no photos could be added: {}", error.what());
+      }
     }
-    const std::vector<LeftOutPhoto> unplaced = reconstruction_->unplaced();
+    std::string summary = placedText(models_->unplaced().size());
+    if (joined > 0) summary += fmt::format(", {} models joined with the largest", joined);
+    return {std::max(matches_->takePeakBytes(), models_->takePeakBytes()), summary};
+  }
+
+  StageOutcome adjusting() {
+    models_->adjust([this](int64_t) { stopIfInterrupted(); });
+    const std::vector<LeftOutPhoto> unplaced = matches_->explain(models_->unplaced());
     warnLeftOut(unplaced);
-    return {reconstruction_->peakBytes(),
-            fmt::format("{} of {} photos", list_.photos.size() - unplaced.size(), list_.photos.size())};
+    return {models_->takePeakBytes(), placedText(unplaced.size())};
+  }
+
+  StageOutcome georeferencing() {
+    const SourceCapture source = models_->read();
+    std::string reason;
+    const auto fit = georeference(source.capture.photos, source.flight, reason);
+    const Json described = fit ? toJson(*fit, source.capture.photos) : Json{{"reason", reason}};
+    writeFileAtomically(out("poses/georeference.json"), dumpJson(described));
+    if (!fit) return {0, "none: " + reason};
+    if (fit->isBent()) {
+      warn(
+          "the heights of GPS bend by {:.1f} m ± {:.1f} m from the middle of the photos to the farthest: the poses "
+          "form a "
+          "{}; photos that look aslant, or lines that cross at another height, prevent it",
+          fit->bend->metres, fit->bend->error, fit->bend->metres > 0 ? "dome" : "bowl");
+    }
+    return {0, fmt::format("{} of {} GPS fixes agree; standard errors: {:.2f} % of the scale, {:.2f}°, {:.2f} m",
+                           fit->inliers, fit->fixes, 100 * fit->scaleError, fit->rotationError, fit->middleError)};
   }
 
   int downscale() const {
     if (options_.downscale > 0) return options_.downscale;
-    int longest = 1;
-    for (const CameraBody& body : list_.bodies) longest = std::max({longest, body.width, body.height});
+    std::vector<int> sides;
+    for (const ListedPhoto& photo : list_.photos) {
+      const CameraBody& body = list_.bodies[static_cast<size_t>(photo.body)];
+      sides.push_back(std::max(body.width, body.height));
+    }
+    const int longest = upperMedian(sides);
     return (longest + kLongestSide - 1) / kLongestSide;
   }
 
   StageOutcome capture() {
     const Capture capture =
-        importSource(reconstruction_->largestModel(), options_.photos.string(), out("capture"),
+        importSource(models_->read(), options_.photos.string(), out("capture"),
                      {.downscale = downscale(), .holdout = options_.holdout, .threads = options_.threads});
     return {0, fmt::format("{} photos, {} held out{}", capture.photos.size(), capture.photosIn(Split::test).size(),
                            capture.geo ? ", georeferenced" : "")};
@@ -163,7 +274,15 @@ class PhotoRun {
     ChildProcess process;
     const std::string failure = process.start(arguments, {.log = log});
     if (!failure.empty()) throw Error(options_.program, "", "cannot be run: " + failure, "install it again");
+    // It is interrupted in its own way: training writes a checkpoint.
+    constexpr double kSecondsBetweenLooks = 0.2;
+    for (bool asked = false; !process.waitFor(kSecondsBetweenLooks);) {
+      if (asked || !options_.interrupted()) continue;
+      process.interrupt();
+      asked = true;
+    }
     const std::string end = process.wait();
+    if (!end.empty()) stopIfInterrupted();
     const std::string words = process.lastWords();
     const std::string line = words.substr(words.rfind('\n') == words.npos ? 0 : words.rfind('\n') + 1);
     if (!end.empty())
@@ -209,7 +328,8 @@ class PhotoRun {
 
   PhotoRunOptions options_;
   PhotoList list_;
-  std::unique_ptr<Reconstruction> reconstruction_;
+  std::unique_ptr<PhotoMatches> matches_;
+  std::unique_ptr<PhotoModels> models_;
 };
 
 }  // namespace

@@ -5,10 +5,14 @@
 //   pairs     which photos are compared                              poses/pairs.json
 //   matches   COLMAP's matches of these pairs                        poses/database.db
 //   mapping   COLMAP's models                                        poses/sparse
-//   capture   the largest model, with a georeference                 capture/
+//   remapping models that share photos joined, more photos added     poses/joined
+//   adjusting the final bundle adjustment of the largest model       poses/adjusted
+//   georeferencing  the similarity to metres that GPS gives           poses/georeference.json
+//   capture   this model, in metres if it has a georeference         capture/
 //   train, bake, evaluate   this program's verbs, as processes       model/, scene/, report.html, eval.json
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "base/file.h"
@@ -21,16 +25,20 @@ struct PhotoRunOptions {
   std::string method;
   double minutes = 10;  // of training
   int64_t steps = 0;    // instead of minutes, if above 0
-  int downscale = 0;    // 0: so that the longer side has at most kLongestSide pixels
+  int downscale = 0;    // 0: so that the longer side of most photos has at most kLongestSide pixels
   std::string holdout = "every:8";
   int threads = 0;      // 0: all
   std::string program;  // this program, which trains, bakes and evaluates
   StageRange range;
+  std::function<bool()> interrupted = [] { return false; };  // asked for now and then; stops the run
 };
+
+// Thrown where `interrupted` has said so. What was done so far is kept.
+struct RunInterrupted {};
 
 inline constexpr int kLongestSide = 1600;  // pixels
 
-// Runs what is not finished. Throws Error naming what cannot go on; what was done so far is kept.
+// Runs what is not finished. Throws Error naming what cannot go on, or RunInterrupted; what was done so far is kept.
 void runFromPhotos(const PhotoRunOptions& options);
 
 }  // namespace tessera

@@ -23,13 +23,14 @@ struct Record {
 };
 
 // What run.json of an earlier run says of stages; nothing if the file is missing or damaged: then all is run again.
-std::vector<std::pair<std::string, Record>> readRecords(const fs::path& file) {
+std::vector<std::pair<std::string, Record>> readRecords(const fs::path& file, std::string& begunFrom) {
   std::vector<std::pair<std::string, Record>> records;
   constexpr uint64_t kMaxBytes = 1 << 20;
   std::error_code status;
   if (!fs::exists(file, status)) return records;
   const Json run = Json::parse(readTextFile(file, kMaxBytes), nullptr, false);
   if (!run.is_object() || !run.contains("stages") || !run["stages"].is_array()) return records;
+  if (run.contains("begun_from") && run["begun_from"].is_string()) begunFrom = run["begun_from"].get<std::string>();
   for (const Json& stage : run["stages"]) {
     if (!stage.is_object() || !stage.contains("name") || !stage["name"].is_string()) continue;
     Record entry;
@@ -91,13 +92,16 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
   requireStage(stages, range.from, "--from");
   requireStage(stages, range.until, "--until");
   const fs::path file = folder / "run.json";
-  const auto before = readRecords(file);
+  std::string begunFrom;  // what an interrupted call was asked to run again from
+  const auto before = readRecords(file, begunFrom);
+  const std::string from = range.from == begunFrom ? "" : range.from;
   Json run = {{"version", 1}, {"request", request}, {"stages", Json::array()}};
+  if (!range.from.empty()) run["begun_from"] = range.from;
   std::string digest;
   bool again = false;
   for (const Stage& stage : stages) {
     digest = textDigest(digest + "\n" + stage.name + "\n" + stage.settings);
-    again = again || stage.name == range.from;
+    again = again || stage.name == from;
     const auto known =
         std::find_if(before.begin(), before.end(), [&](const auto& entry) { return entry.first == stage.name; });
     const bool isKnown = !again && known != before.end() && known->second.digest == digest;
@@ -131,6 +135,7 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
     if (again) write(run, file);
     if (stage.name == range.until) break;
   }
+  if (run.erase("begun_from") > 0 && again) write(run, file);
 }
 
 }  // namespace tessera

@@ -28,7 +28,9 @@ struct Stage {
 };
 
 struct StageRange {
-  std::string from;   // run again from this stage on, even if it is finished; empty: what is not finished
+  // Run again from this stage on, even if it is finished; empty: what is not finished. A call with the same stage after
+  // one that was interrupted goes on with it.
+  std::string from;
   std::string until;  // the last stage to run; empty: all
 };
 

@@ -112,6 +112,16 @@ TEST_F(Stages, DoNotResumeWhatBeganWithOtherSettings) {
   EXPECT_EQ(run({"", "y", "y"}, {.from = "two"}), "two three ") << "to begin anew was asked for";
 }
 
+TEST_F(Stages, GoOnWithWhatWasBegunAgainByTheSameCall) {
+  run({"", "", ""});
+  failing_ = "three";
+  EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "two failed");
+  EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "failed") << "the second has been run again";
+  failing_.clear();
+  EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "resumed three ");
+  EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "two three ") << "nothing was interrupted";
+}
+
 TEST_F(Stages, ForgetWhatFollowsAStageThatIsInterrupted) {
   run({"", "", ""});
   failing_ = "two";

@@ -1,0 +1,131 @@
+#include "photogrammetry/photo_matches.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "base/error.h"
+#include "photogrammetry/colmap_database.h"
+
+namespace tessera {
+namespace {
+
+constexpr size_t kPairsAtOnce =
+    100;  // the program commits matches in large batches: what it has done is lost if killed
+constexpr int kFewFeatures = 200;
+
+void linkPhoto(const fs::path& photo, const fs::path& link) {
+  std::error_code status;
+  if (fs::is_symlink(link, status) && fs::read_symlink(link, status) == photo) return;
+  fs::remove(link, status);
+  fs::create_symlink(photo, link, status);
+  if (status) throw Error(link.string(), "", "cannot be made: " + status.message(), "name a folder on another disk");
+}
+
+}  // namespace
+
+PhotoMatches::PhotoMatches(fs::path folder, const PhotoList& list, ColmapSettings settings)
+    : folder_(std::move(folder)), list_(list), settings_(std::move(settings)) {}
+
+void PhotoMatches::runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look) {
+  ColmapProgram colmap(folder_ / fmt::format("{}.log", step), settings_.program);
+  colmap.run(std::move(arguments), look);
+  peakBytes_ = std::max(peakBytes_, colmap.peakBytes());
+}
+
+void PhotoMatches::discard() const {
+  // The log of the database goes first: it would be replayed into a new one.
+  for (const char* name : {"database.db-wal", "database.db-shm", "database.db", "images"}) {
+    std::error_code status;
+    fs::remove_all(folder_ / name, status);
+    if (status) throw Error((folder_ / name).string(), "", "cannot be removed: " + status.message(), "remove it");
+  }
+}
+
+void PhotoMatches::discardMatches() const {
+  std::error_code status;
+  if (fs::exists(database(), status)) ColmapDatabase(database()).removeMatches();
+}
+
+void PhotoMatches::extractFeatures(const Watch& watch) {
+  std::error_code status;
+  fs::create_directories(folder_ / "images", status);
+  if (status) throw Error(folder_.string(), "", "cannot be made: " + status.message(), "name another folder");
+  if (!fs::exists(database())) {
+    const fs::path partial = folder_ / "database.partial.db";
+    fs::remove(partial, status);
+    runColmap("features", {"database_creator", "--database_path", partial.string()}, {});
+    ColmapDatabase(partial).addPhotos(list_);
+    fs::rename(partial, database(), status);
+    if (status) throw Error(database().string(), "", "cannot be made: " + status.message(), "check the disk");
+  }
+  for (const ListedPhoto& photo : list_.photos)
+    linkPhoto(fs::absolute(photo.file), folder_ / "images" / photo.safeName);
+  const auto done = [&] { return static_cast<int64_t>(ColmapDatabase(database()).features().size()); };
+  const auto count = static_cast<int64_t>(list_.photos.size());
+  if (done() < count) {
+    runColmap(
+        "features",
+        {"feature_extractor", "--database_path", database().string(), "--image_path", (folder_ / "images").string(),
+         "--SiftExtraction.use_gpu", "0", "--SiftExtraction.num_threads", settings_.threadsText()},
+        [&] { watch(done()); });
+  }
+  if (done() == 0) throw Error(folder_.string(), "database.db", "no photo has features", "see features.log beside it");
+}
+
+void PhotoMatches::match(const std::vector<PhotoPair>& pairs, const Watch& watch) {
+  const fs::path list = folder_ / "pairs.txt";
+  std::vector<PhotoPair> missing;
+  const auto known = ColmapDatabase(database()).inliers();
+  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(missing),
+               [&](const PhotoPair& pair) { return !known.contains(pair); });
+  for (size_t begin = 0; begin < missing.size(); begin += kPairsAtOnce) {
+    std::string text;
+    const size_t end = std::min(missing.size(), begin + kPairsAtOnce);
+    for (size_t i = begin; i < end; ++i) {
+      text += fmt::format("{} {}\n", list_.photos[static_cast<size_t>(missing[i].first)].safeName,
+                          list_.photos[static_cast<size_t>(missing[i].second)].safeName);
+    }
+    writeFileAtomically(list, text);
+    runColmap(
+        "matches",
+        {"matches_importer", "--database_path", database().string(), "--match_list_path", list.string(), "--match_type",
+         "pairs", "--SiftMatching.use_gpu", "0", "--SiftMatching.num_threads", settings_.threadsText()},
+        [&] { watch(static_cast<int64_t>(pairs.size() - missing.size() + begin)); });
+    watch(static_cast<int64_t>(pairs.size() - missing.size() + end));
+  }
+}
+
+size_t PhotoMatches::linkedPairs() const {
+  size_t linked = 0;
+  for (const auto& [pair, inliers] : ColmapDatabase(database()).inliers()) linked += inliers > 0 ? 1 : 0;
+  return linked;
+}
+
+std::vector<LeftOutPhoto> PhotoMatches::explain(const std::vector<int>& photos) const {
+  const ColmapDatabase database(this->database());
+  const std::map<int, int> features = database.features();
+  std::map<int, int> links;
+  for (const auto& [pair, inliers] : database.inliers()) {
+    if (inliers == 0) continue;
+    ++links[pair.first];
+    ++links[pair.second];
+  }
+  std::vector<LeftOutPhoto> explained;
+  for (const int i : photos) {
+    const auto count = features.find(i);
+    std::string reason = "not consistent with the others";
+    if (count == features.end()) {
+      reason = "not decodable";
+    } else if (count->second < kFewFeatures) {
+      reason = "few features, as of water, sky or a blurred picture";
+    } else if (!links.contains(i)) {
+      reason = "nothing in common with another photo";
+    }
+    explained.push_back({list_.photos[static_cast<size_t>(i)].name, reason});
+  }
+  return explained;
+}
+
+}  // namespace tessera

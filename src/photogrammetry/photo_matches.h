@@ -1,0 +1,46 @@
+// Features of photos and their matches: a folder with the photos under safe names and COLMAP's database. Each step goes
+// on where it was interrupted.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "photogrammetry/colmap_program.h"
+#include "photogrammetry/photo_list.h"
+#include "photogrammetry/photo_pairs.h"
+
+namespace tessera {
+
+class PhotoMatches {
+ public:
+  // `folder` is created when it is written to. `list` must outlive this object.
+  PhotoMatches(fs::path folder, const PhotoList& list, ColmapSettings settings);
+
+  // Called twice a second with the number of photos or pairs that are done. What it throws ends the program that runs.
+  using Watch = std::function<void(int64_t done)>;
+
+  void extractFeatures(const Watch& watch);
+  // Removes features and matches, which belong to other photos. Throws Error if a file cannot be removed.
+  void discard() const;
+  void discardMatches() const;
+  // Compares pairs that have not been compared yet.
+  void match(const std::vector<PhotoPair>& pairs, const Watch& watch);
+  size_t linkedPairs() const;  // of those compared, the pairs that one geometry explains
+  // Returns these photos with the likely reason why no pose was found for them. `photos` are indices into the list.
+  std::vector<LeftOutPhoto> explain(const std::vector<int>& photos) const;
+
+  int64_t takePeakBytes() { return std::exchange(peakBytes_, 0); }  // of the programs run since the last call
+
+ private:
+  fs::path database() const { return folder_ / "database.db"; }
+  void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
+
+  fs::path folder_;
+  const PhotoList& list_;
+  ColmapSettings settings_;
+  int64_t peakBytes_ = 0;
+};
+
+}  // namespace tessera

@@ -1,0 +1,100 @@
+#include "photogrammetry/photo_matches.h"
+
+#include "photogrammetry/colmap_database.h"
+#include "photogrammetry/testing/fake_colmap.h"
+
+namespace tessera {
+namespace {
+
+TEST(ColmapProgram, IsRefusedInOtherVersions) {
+  const TemporaryFolder folder;
+  const auto open = [&](const fs::path& program) {
+    return errorMessage([&] { ColmapProgram(folder / "log", program.string()); });
+  };
+  const auto says = [&](const std::string& words) {
+    writeFileAtomically(folder / "other", "#!/bin/sh\necho '" + words + "'\n");
+    fs::permissions(folder / "other", fs::perms::owner_all);
+    return folder / "other";
+  };
+  EXPECT_EQ(open(writeColmap(folder, "")), "");
+  EXPECT_NE(open(says("COLMAP 3.13 -- Structure-from-Motion")).find("is COLMAP 3.13"), std::string::npos);
+  EXPECT_NE(open(says("hello")).find("does not say that it is COLMAP"), std::string::npos);
+  EXPECT_NE(open("no-such-program").find("apt-get install colmap"), std::string::npos);
+}
+
+TEST(ColmapProgram, FailsWithTheLastWordsOfTheProgram) {
+  const TemporaryFolder folder;
+  ColmapProgram colmap(folder / "log", writeColmap(folder, "[ $command = ok ] && exit; echo no matches; exit 1"));
+  colmap.run({"ok"});
+  const std::string message = errorMessage([&] { colmap.run({"mapper"}); });
+  EXPECT_NE(message.find("mapper: ended with status 1: no matches"), std::string::npos) << message;
+  EXPECT_EQ(readTextFile(folder / "log"), "no matches\n");
+}
+
+TEST(ColmapDatabase, HoldsCamerasAndPhotosOnce) {
+  const TemporaryFolder folder;
+  makeDatabase(folder / "database.db");
+  PhotoList list;
+  list.bodies = {{"a", 800, 600, 640}, {"b", 600, 800, 0}};
+  for (int i = 0; i < 3; ++i) {
+    list.photos.emplace_back();
+    list.photos.back().safeName = "p" + std::to_string(i);
+    list.photos.back().body = i % 2;
+  }
+  ColmapDatabase database(folder / "database.db");
+  database.addPhotos(list);
+  database.addPhotos(list);
+
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open((folder / "database.db").c_str(), &handle), SQLITE_OK);
+  std::string rows;
+  const auto add = [](void* to, int columns, char** values, char**) {
+    for (int i = 0; i < columns; ++i) *static_cast<std::string*>(to) += std::string(values[i]) + " ";
+    return 0;
+  };
+  sqlite3_exec(handle, "SELECT camera_id, model, width, height, length(params), prior_focal_length FROM cameras", add,
+               &rows, nullptr);
+  sqlite3_exec(handle, "SELECT image_id, name, camera_id FROM images", add, &rows, nullptr);
+  sqlite3_close(handle);
+  EXPECT_EQ(rows, "1 3 800 600 40 1 2 3 600 800 40 0 1 p0 1 2 p1 2 3 p2 1 ");
+}
+
+TEST(ColmapDatabase, TellsWhatIsDone) {
+  const TemporaryFolder folder;
+  makeDatabase(folder / "database.db");
+  ColmapDatabase database(folder / "database.db");
+  EXPECT_EQ(database.features(), (std::map<int, int>{{0, 900}, {1, 0}}));
+  EXPECT_EQ(database.inliers(), (std::map<PhotoPair, int>{{{0, 1}, 77}, {{0, 2}, 0}}));
+  database.removeMatches();
+  EXPECT_EQ(database.features().size(), 2u);
+  EXPECT_TRUE(database.inliers().empty());
+}
+
+TEST(ColmapDatabase, IsRefusedIfItIsSomethingElse) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(ColmapDatabase(folder / "none.db"), Error);
+  writeFileAtomically(folder / "text.db", "not a database, but long enough to be looked at as one");
+  EXPECT_THROW(ColmapDatabase(folder / "text.db"), Error);
+  EXPECT_EQ(readTextFile(folder / "text.db").substr(0, 14), "not a database");
+}
+
+TEST(PhotoMatches, SayWhyPhotosHaveNoPose) {
+  const TemporaryFolder folder;
+  makeDatabase(folder / "database.db");
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open((folder / "database.db").c_str(), &handle), SQLITE_OK);
+  sqlite3_exec(handle, "INSERT INTO keypoints VALUES(3, 12), (4, 4000)", nullptr, nullptr, nullptr);
+  sqlite3_close(handle);
+  const PhotoList list = numberedPhotos(5);
+  std::string reasons;
+  for (const LeftOutPhoto& photo : PhotoMatches(folder.path(), list, {}).explain({0, 2, 3, 4}))
+    reasons += photo.name + ": " + photo.reason + "\n";
+  EXPECT_EQ(reasons,
+            "p0.jpg: not consistent with the others\n"
+            "p2.jpg: few features, as of water, sky or a blurred picture\n"
+            "p3.jpg: nothing in common with another photo\n"
+            "p4.jpg: not decodable\n");
+}
+
+}  // namespace
+}  // namespace tessera

@@ -1,0 +1,417 @@
+#include "photogrammetry/photo_models.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <optional>
+#include <set>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "import/colmap_model.h"
+#include "import/georeference.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kPhotosPerSnapshot = 25;
+constexpr size_t kKeptSnapshots = 2;        // the last may be of a time when the mapper went wrong
+constexpr size_t kLeastShared = 3;          // photos that model_merger needs
+constexpr size_t kPhotosForFullLens = 40;   // of a camera, from which on its principal point is adjusted
+constexpr double kFarthestCentre = 0.05;    // of the size of the picture, of a principal point from the middle
+constexpr const char* kAdjustments = "12";  // iterations: eight brought the change of the cost below one in a million
+
+// Returns the end of a log.
+std::string readEnd(const fs::path& log) {
+  constexpr std::streamoff kTail = 1 << 14;
+  std::ifstream file(log, std::ios::binary | std::ios::ate);
+  if (!file) return {};
+  const std::streamoff size = file.tellg();
+  std::string text(static_cast<size_t>(std::min(size, kTail)), '\0');
+  file.seekg(size - static_cast<std::streamoff>(text.size()));
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return text;
+}
+
+// Returns the number of photos that the mapper has registered last, from "Registering image #7 (3)" in its log.
+int64_t lastRegistered(const fs::path& log) {
+  const std::string text = readEnd(log);
+  const size_t at = text.rfind("Registering image #");
+  if (at == text.npos) return 0;
+  const size_t open = text.find('(', at);
+  return open == text.npos ? 0 : std::atoll(text.c_str() + open + 1);
+}
+
+// Returns the photos of a model, by the numbers that the database gives them, less 1: indices into the list. Nothing of
+// a model that was not written to its end.
+std::set<int> photosIn(const fs::path& folder) {
+  std::set<int> photos;
+  std::error_code status;
+  if (!fs::exists(folder / "images.bin", status) || !fs::exists(folder / "points3D.bin", status)) return photos;
+  try {
+    for (const ColmapModel::Image& image : readColmapModel(folder).images)
+      photos.insert(static_cast<int>(image.id) - 1);
+  } catch (const Error&) {
+    photos.clear();
+  }
+  return photos;
+}
+
+struct Piece {
+  fs::path folder;
+  std::set<int> photos;
+};
+
+// Returns the readable models in a folder, the largest first.
+std::vector<Piece> piecesIn(const fs::path& folder) {
+  std::vector<Piece> pieces;
+  std::error_code status;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
+    Piece piece{entry.path(), photosIn(entry.path())};
+    if (!piece.photos.empty()) pieces.push_back(std::move(piece));
+  }
+  std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
+    return a.photos.size() != b.photos.size() ? a.photos.size() > b.photos.size()
+                                              : naturalLess(a.folder.string(), b.folder.string());
+  });
+  return pieces;
+}
+
+// Returns the number of photos that a model states, without reading all of it; 0 if it is not complete.
+uint64_t statedPhotos(const fs::path& folder) {
+  std::error_code status;
+  if (!fs::exists(folder / "points3D.bin", status)) return 0;
+  uint64_t count = 0;
+  std::ifstream file(folder / "images.bin", std::ios::binary);
+  if (!file.read(reinterpret_cast<char*>(&count), sizeof count)) return 0;
+  return count;
+}
+
+// Removes all but the snapshots with the most photos: together, they would grow with the square of the number of
+// photos. Their names are times that overflow, and say nothing.
+void thinSnapshots(const fs::path& folder) {
+  std::vector<std::pair<uint64_t, fs::path>> complete;
+  std::error_code status;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
+    if (const uint64_t photos = statedPhotos(entry.path()); photos > 0) complete.emplace_back(photos, entry.path());
+  }
+  std::sort(complete.begin(), complete.end(), std::greater<>());
+  for (size_t i = kKeptSnapshots; i < complete.size(); ++i) fs::remove_all(complete[i].second, status);
+}
+
+void removeFolder(const fs::path& folder) {
+  std::error_code status;
+  fs::remove_all(folder, status);
+  if (status) throw Error(folder.string(), "", "cannot be removed: " + status.message(), "remove it");
+}
+
+void makeFolder(const fs::path& folder) {
+  std::error_code status;
+  fs::create_directories(folder, status);
+  if (status) throw Error(folder.string(), "", "cannot be written: " + status.message(), "check the disk");
+}
+
+// Puts a folder in the place of another, which is there until then.
+void replaceFolder(const fs::path& newFolder, const fs::path& target) {
+  const fs::path before = fs::path(target) += ".before";
+  std::error_code status;
+  fs::remove_all(before, status);
+  if (fs::exists(target, status)) fs::rename(target, before, status);
+  fs::rename(newFolder, target, status);
+  if (status) throw Error(target.string(), "", "cannot be written: " + status.message(), "check the disk");
+  fs::remove_all(before, status);
+}
+
+// Returns cameras.bin with these cameras.
+Bytes encodeCameras(const std::map<uint32_t, Camera>& cameras) {
+  Bytes bytes;
+  const auto append = [&bytes](auto value) {
+    const auto* begin = reinterpret_cast<const std::byte*>(&value);
+    bytes.insert(bytes.end(), begin, begin + sizeof value);
+  };
+  append(static_cast<uint64_t>(cameras.size()));
+  for (const auto& [id, camera] : cameras) {
+    append(id);
+    append(static_cast<int32_t>(camera.lens));
+    append(static_cast<uint64_t>(camera.width));
+    append(static_cast<uint64_t>(camera.height));
+    for (int i = 0; i < lensParameterCount(camera.lens); ++i) append(camera.parameters[static_cast<size_t>(i)]);
+  }
+  return bytes;
+}
+
+Camera withDecentring(Camera camera) {
+  if (camera.lens != LensModel::radial) return camera;
+  const auto [f, cx, cy, k1, k2] = std::tuple(camera.parameters[0], camera.parameters[1], camera.parameters[2],
+                                              camera.parameters[3], camera.parameters[4]);
+  camera.lens = LensModel::openCv;
+  camera.parameters = {f, f, cx, cy, k1, k2, 0, 0};
+  return camera;
+}
+
+bool isPlausible(const ColmapModel& model, const ColmapModel& before) {
+  if (model.images.size() != before.images.size()) return false;
+  for (const auto& [id, camera] : model.cameras) {
+    const auto was = before.cameras.find(id);
+    if (was == before.cameras.end()) return false;
+    const double dx = (camera.centreX() - 0.5 * camera.width) / camera.width,
+                 dy = (camera.centreY() - 0.5 * camera.height) / camera.height;
+    const double oblong = camera.focalX() / camera.focalY();
+    const double longer = camera.focalX() / was->second.focalX();
+    if (!(std::abs(dx) < kFarthestCentre && std::abs(dy) < kFarthestCentre && oblong > 0.98 && oblong < 1.02 &&
+          longer > 0.8 && longer < 1.25))
+      return false;
+  }
+  return true;
+}
+
+}  // namespace
+
+PhotoModels::PhotoModels(fs::path folder, const PhotoList& list, ColmapSettings settings)
+    : folder_(std::move(folder)), list_(list), settings_(std::move(settings)) {}
+
+void PhotoModels::runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look) {
+  ColmapProgram colmap(folder_ / fmt::format("{}.log", step), settings_.program);
+  colmap.run(std::move(arguments), look);
+  peakBytes_ = std::max(peakBytes_, colmap.peakBytes());
+}
+
+void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch) {
+  const fs::path log = folder_ / "mapping.log", snapshots = folder_ / "snapshots", begun = folder_ / "snapshot.begun";
+  std::error_code status;
+  if (!resumes) fs::remove_all(begun, status);
+  // The snapshot that an interrupted call went on from is kept until there is another one.
+  if (const auto pieces = resumes ? piecesIn(snapshots) : std::vector<Piece>(); !pieces.empty()) {
+    fs::remove_all(begun, status);
+    fs::rename(pieces[0].folder, begun, status);
+  }
+  fs::remove_all(snapshots, status);
+  fs::remove_all(output, status);
+  fs::remove(log, status);
+  makeFolder(output);
+  makeFolder(snapshots);
+  std::vector<std::string> arguments{"mapper",
+                                     "--database_path",
+                                     (folder_ / "database.db").string(),
+                                     "--image_path",
+                                     (folder_ / "images").string(),
+                                     "--output_path",
+                                     output.string(),
+                                     "--Mapper.num_threads",
+                                     settings_.threadsText(),
+                                     "--Mapper.min_model_size",
+                                     "3",
+                                     "--Mapper.init_min_tri_angle",
+                                     "8",
+                                     "--Mapper.ba_global_function_tolerance",
+                                     "1e-6",
+                                     "--Mapper.ba_global_images_ratio",
+                                     "1.2",
+                                     "--Mapper.ba_global_points_ratio",
+                                     "1.2",
+                                     "--Mapper.ba_global_max_refinements",
+                                     "2",
+                                     "--Mapper.snapshot_path",
+                                     snapshots.string(),
+                                     "--Mapper.snapshot_images_freq",
+                                     std::to_string(kPhotosPerSnapshot)};
+  const fs::path from = photosIn(begun).empty() ? input : begun;
+  if (!from.empty()) arguments.insert(arguments.end(), {"--input_path", from.string()});
+  runColmap("mapping", std::move(arguments), [&] {
+    thinSnapshots(snapshots);
+    watch(lastRegistered(log));
+  });
+}
+
+void PhotoModels::map(bool resumes, const Watch& watch) {
+  const fs::path partial = folder_ / "sparse.partial";
+  try {
+    runMapper({}, partial, resumes, watch);
+  } catch (const Error&) {
+    // Without any model, the mapper reports failure, too.
+    if (readEnd(folder_ / "mapping.log").find("failed to create sparse model") == std::string::npos) throw;
+  }
+  // Going on from a snapshot, it writes one model, into the folder itself.
+  if (!photosIn(partial).empty()) {
+    makeFolder(partial / "0");
+    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
+      fs::rename(partial / name, partial / "0" / name);
+  }
+  if (piecesIn(partial).empty()) {
+    throw Error(folder_.string(), "", "no two photos could be placed relative to each other",
+                "check that neighbouring photos overlap by more than half, and are sharp");
+  }
+  replaceFolder(partial, folder_ / "sparse");
+  // What came of the models before.
+  discardAdjusted();
+  discardJoined();
+}
+
+void PhotoModels::discardJoined() const {
+  discardAdjusted();
+  for (const char* name : {"joined", "joined.partial", "snapshots", "snapshot.begun"}) removeFolder(folder_ / name);
+}
+
+void PhotoModels::discardAdjusted() const {
+  removeFolder(folder_ / "adjusted");
+}
+
+fs::path PhotoModels::last(bool adjusted) const {
+  std::error_code status;
+  if (adjusted && fs::exists(folder_ / "adjusted", status)) return folder_ / "adjusted";
+  if (fs::exists(folder_ / "joined", status)) return folder_ / "joined";
+  const std::vector<Piece> pieces = piecesIn(folder_ / "sparse");
+  if (pieces.empty()) throw Error((folder_ / "sparse").string(), "", "holds no model", "run the stage `mapping` again");
+  return pieces[0].folder;
+}
+
+bool PhotoModels::agreesWithGps(const fs::path& joined, const fs::path& before) const {
+  const auto fit = [&](const fs::path& model) {
+    const SourceCapture source = readFrom(model);
+    std::string reason;
+    return georeference(source.capture.photos, source.flight, reason);
+  };
+  constexpr double kWorse = 1.5, kMetres = 1, kFewer = 0.9;
+  const auto was = fit(before);
+  if (!was) return true;  // nothing can be said
+  const auto is = fit(joined);
+  return is && is->rmsMetres<kWorse * was->rmsMetres + kMetres&& static_cast<double>(is->inliers) / is->fixes> kFewer *
+                   static_cast<double>(was->inliers) / was->fixes;
+}
+
+int PhotoModels::join(const Watch& watch) {
+  const std::vector<Piece> pieces = piecesIn(folder_ / "sparse");
+  if (pieces.size() < 2) return 0;
+  const fs::path result = folder_ / "joined.partial", attempt = folder_ / "joined.attempt";
+  std::error_code status;
+  fs::remove_all(result, status);
+  Piece whole = pieces[0];
+  int count = 0;
+  for (size_t i = 1; i < pieces.size(); ++i) {
+    size_t shared = 0;
+    for (const int photo : pieces[i].photos) shared += whole.photos.contains(photo) ? 1 : 0;
+    if (shared < kLeastShared) continue;
+    fs::remove_all(attempt, status);
+    makeFolder(attempt);
+    runColmap("joining",
+              {"model_merger", "--input_path1", whole.folder.string(), "--input_path2", pieces[i].folder.string(),
+               "--output_path", attempt.string()},
+              [&] { watch(0); });
+    // If it fails, it reports success and writes the first model.
+    const std::set<int> photos = photosIn(attempt);
+    if (photos.size() <= whole.photos.size() || !agreesWithGps(attempt, whole.folder)) continue;
+    replaceFolder(attempt, result);
+    whole = {result, photos};
+    ++count;
+  }
+  fs::remove_all(attempt, status);
+  if (count == 0) return 0;
+  // The models only share the poses of photos so far: their points are joined by the matches between them.
+  const fs::path points = folder_ / "joined.points", adjusted = folder_ / "joined.adjusted";
+  for (const fs::path& folder : {points, adjusted}) {
+    removeFolder(folder);
+    makeFolder(folder);
+  }
+  runColmap("joining",
+            {"point_triangulator", "--database_path", (folder_ / "database.db").string(), "--image_path",
+             (folder_ / "images").string(), "--input_path", result.string(), "--output_path", points.string()},
+            [&] { watch(0); });
+  runColmap("joining",
+            {"bundle_adjuster", "--input_path", points.string(), "--output_path", adjusted.string(),
+             "--BundleAdjustment.max_num_iterations", kAdjustments},
+            [&] { watch(0); });
+  if (photosIn(adjusted).size() != whole.photos.size()) {
+    throw Error(adjusted.string(), "", "lacks photos of the models that were joined",
+                "see joining.log beside it; run again to go on");
+  }
+  replaceFolder(adjusted, folder_ / "joined");
+  for (const fs::path& folder : {points, result}) fs::remove_all(folder, status);
+  return count;
+}
+
+void PhotoModels::extend(bool resumes, const Watch& watch) {
+  const fs::path input = last(false), partial = folder_ / "extended.partial";
+  runMapper(input, partial, resumes, watch);
+  std::error_code status;
+  if (photosIn(partial).size() >= photosIn(input).size()) {
+    discardAdjusted();
+    replaceFolder(partial, folder_ / "joined");
+  }
+  for (const char* name : {"extended.partial", "snapshots", "snapshot.begun"}) fs::remove_all(folder_ / name, status);
+}
+
+void PhotoModels::adjust(const Watch& watch) {
+  const fs::path input = last(false), begun = folder_ / "adjusted.begun", partial = folder_ / "adjusted.partial";
+  const ColmapModel before = readColmapModel(input);
+  std::map<uint32_t, size_t> photosByCamera;
+  for (const ColmapModel::Image& image : before.images) ++photosByCamera[image.camera];
+  const bool allHaveMany = std::all_of(photosByCamera.begin(), photosByCamera.end(),
+                                       [](const auto& entry) { return entry.second >= kPhotosForFullLens; });
+  const auto adjustWith = [&](bool fullLens) {
+    std::map<uint32_t, Camera> cameras;
+    for (const auto& [id, camera] : before.cameras)
+      cameras[id] = fullLens && photosByCamera[id] >= kPhotosForFullLens ? withDecentring(camera) : camera;
+    for (const fs::path& folder : {begun, partial}) {
+      removeFolder(folder);
+      makeFolder(folder);
+    }
+    for (const char* name : {"images.bin", "points3D.bin"})
+      fs::copy_file(input / name, begun / name, fs::copy_options::overwrite_existing);
+    writeFileAtomically(begun / "cameras.bin", encodeCameras(cameras));
+    runColmap("adjusting",
+              {"bundle_adjuster", "--input_path", begun.string(), "--output_path", partial.string(),
+               "--BundleAdjustment.max_num_iterations", kAdjustments, "--BundleAdjustment.refine_principal_point",
+               fullLens && allHaveMany ? "1" : "0"},
+              [&] { watch(static_cast<int64_t>(before.images.size())); });
+    return !photosIn(partial).empty() && isPlausible(readColmapModel(partial), before);
+  };
+  if (!adjustWith(true) && !adjustWith(false)) {
+    warn("the final bundle adjustment gives no plausible lens; poses stay as they were estimated");
+    removeFolder(partial);
+    fs::copy(input, partial);
+  }
+  replaceFolder(partial, folder_ / "adjusted");
+  std::error_code status;
+  fs::remove_all(begun, status);
+}
+
+PhotoModels::Count PhotoModels::countMapped() const {
+  std::set<int> photos;
+  const std::vector<Piece> pieces = piecesIn(folder_ / "sparse");
+  for (const Piece& piece : pieces) photos.insert(piece.photos.begin(), piece.photos.end());
+  return {pieces.size(), photos.size()};
+}
+
+std::vector<int> PhotoModels::unplaced() const {
+  const std::set<int> photos = photosIn(last(true));
+  std::vector<int> missing;
+  for (int i = 0; i < static_cast<int>(list_.photos.size()); ++i)
+    if (!photos.contains(i)) missing.push_back(i);
+  return missing;
+}
+
+SourceCapture PhotoModels::readFrom(const fs::path& model) const {
+  // The links in `images` lead out of that folder, which would be refused: photos get their own paths below.
+  SourceCapture source = captureFromColmap(readColmapModel(model), folder_ / "named");
+  source.flight.assign(source.capture.photos.size(), 0);
+  std::map<std::string, const ListedPhoto*> bySafeName;
+  for (const ListedPhoto& photo : list_.photos) bySafeName[photo.safeName] = &photo;
+  for (Photo& photo : source.capture.photos) {
+    const auto listed = bySafeName.find(photo.image.filename().string());
+    if (listed == bySafeName.end()) continue;
+    photo.name = listed->second->name;
+    photo.image = fs::absolute(listed->second->file);
+    photo.gps = listed->second->tags.gps;
+    source.flight[static_cast<size_t>(&photo - source.capture.photos.data())] = listed->second->flight;
+  }
+  return source;
+}
+
+SourceCapture PhotoModels::read() const {
+  return readFrom(last(true));
+}
+
+}  // namespace tessera

@@ -1,0 +1,68 @@
+// Poses of photos from their matches: COLMAP's sparse models in the folder of PhotoMatches. Each step goes on where it
+// was interrupted, and leaves models that others have not replaced.
+//
+//   sparse/N    the models of `map`
+//   joined/     the largest of them, with those that share photos with it, and photos that were added later
+//   adjusted/   the last of these, after the final bundle adjustment
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <utility>
+#include <vector>
+
+#include "import/source.h"
+#include "photogrammetry/colmap_program.h"
+#include "photogrammetry/photo_list.h"
+
+namespace tessera {
+
+class PhotoModels {
+ public:
+  // `list` must outlive this object.
+  PhotoModels(fs::path folder, const PhotoList& list, ColmapSettings settings);
+
+  // Called twice a second; what it throws ends the program that runs.
+  using Watch = std::function<void(int64_t photosInModel)>;
+
+  // Estimates poses. `resumes`: goes on from the last snapshot of a call that was interrupted. Throws Error if no model
+  // results.
+  void map(bool resumes, const Watch& watch);
+
+  // Joins models that share photos with the largest. Returns how many it has joined.
+  int join(const Watch& watch);
+  // Adds photos that further matches have connected with the largest model. `resumes` as for `map`.
+  void extend(bool resumes, const Watch& watch);
+  void discardJoined() const;
+
+  // Adjusts poses, points and lenses together. Cameras of many photos get a lens with decentring and a free principal
+  // point, which the mapper keeps in the middle: it would be too weakly determined while there are few photos.
+  void adjust(const Watch& watch);
+  void discardAdjusted() const;
+
+  struct Count {
+    size_t models = 0;  // of `map`
+    size_t photos = 0;  // of all these models together
+  };
+  Count countMapped() const;
+  // Returns the photos that the last model lacks: indices into the list, sorted.
+  std::vector<int> unplaced() const;
+  // Returns the last model, with photos under their own names.
+  SourceCapture read() const;
+
+  int64_t takePeakBytes() { return std::exchange(peakBytes_, 0); }  // of the programs run since the last call
+
+ private:
+  fs::path last(bool adjusted) const;
+  void runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch);
+  void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
+  bool agreesWithGps(const fs::path& joined, const fs::path& before) const;
+  SourceCapture readFrom(const fs::path& model) const;
+
+  fs::path folder_;
+  const PhotoList& list_;
+  ColmapSettings settings_;
+  int64_t peakBytes_ = 0;
+};
+
+}  // namespace tessera

@@ -1,0 +1,194 @@
+#include "photogrammetry/photo_models.h"
+
+#include <cmath>
+#include <cstring>
+#include <numeric>
+
+#include "import/colmap_model.h"
+#include "photogrammetry/testing/fake_colmap.h"
+
+namespace tessera {
+namespace {
+
+void ignore(int64_t) {}
+
+std::vector<int> numbers(int begin, int end) {
+  std::vector<int> photos(static_cast<size_t>(end - begin));
+  std::iota(photos.begin(), photos.end(), begin);
+  return photos;
+}
+
+// The models of one list of photos, made by a script in place of colmap.
+class PhotoModelsTest : public testing::Test {
+ protected:
+  PhotoModels models(const std::string& script) {
+    return PhotoModels(folder_ / "poses", list_, {.program = writeColmap(folder_, script).string()});
+  }
+  std::string prepared(const std::string& name, const std::vector<int>& photos, const FakeLens& lens = {}) {
+    writeModel(folder_ / name, photos, lens);
+    return (folder_ / name).string();
+  }
+  Camera adjustedCamera() { return readColmapModel(folder_ / "poses/adjusted").cameras.at(1); }
+
+  TemporaryFolder folder_;
+  PhotoList list_ = numberedPhotos(50);
+};
+
+TEST_F(PhotoModelsTest, SayThatNoPhotosCouldBePlaced) {
+  PhotoModels estimated = models("echo 'ERROR: failed to create sparse model'; exit 1");
+  const std::string message = errorMessage([&] { estimated.map(false, ignore); });
+  EXPECT_NE(message.find("no two photos could be placed"), std::string::npos) << message;
+  EXPECT_FALSE(fs::exists(folder_ / "poses/sparse"));
+}
+
+TEST_F(PhotoModelsTest, GoOnFromTheLastSnapshotThatIsWhole) {
+  const std::string model = prepared("whole", numbers(0, 18)), fewer = prepared("fewer", numbers(0, 9));
+  // The first run writes snapshots and fails; with a model to go on from, it returns that model.
+  PhotoModels estimated = models("if [ -n \"$input_path\" ]; then cp $input_path/* $output_path; exit; fi\ncp -r " +
+                                 model + " $Mapper_snapshot_path/18446744073709551615; cp -r " + fewer +
+                                 " $Mapper_snapshot_path/8; mkdir $Mapper_snapshot_path/7; cp " + model +
+                                 "/images.bin $Mapper_snapshot_path/7; exit 1");
+  EXPECT_THROW(estimated.map(false, ignore), Error);
+  EXPECT_TRUE(fs::exists(folder_ / "poses/snapshots/7"));
+  estimated.map(true, ignore);
+  EXPECT_EQ(estimated.unplaced(), numbers(18, 50));
+  EXPECT_EQ(estimated.read().capture.photos.size(), 18u);
+  EXPECT_FALSE(fs::exists(folder_ / "poses/snapshots"));
+  EXPECT_THROW(estimated.map(false, ignore), Error) << "a new beginning has no snapshot to go on from";
+  EXPECT_EQ(estimated.read().capture.photos.size(), 18u) << "models remain until others replace them";
+}
+
+TEST_F(PhotoModelsTest, KeepOnlyTheLargestSnapshotsWhileTheMapperRuns) {
+  std::string script;
+  for (int photos = 10; photos <= 40; photos += 10) {
+    script += "cp -r " + prepared("m" + std::to_string(photos), numbers(0, photos)) + " $Mapper_snapshot_path/x" +
+              std::to_string(photos) + "\n";
+  }
+  PhotoModels estimated = models(script + "sleep 2; exit 1");
+  EXPECT_THROW(estimated.map(false, ignore), Error);
+  EXPECT_FALSE(fs::exists(folder_ / "poses/snapshots/x10"));
+  EXPECT_FALSE(fs::exists(folder_ / "poses/snapshots/x20"));
+  EXPECT_TRUE(fs::exists(folder_ / "poses/snapshots/x30"));
+  EXPECT_TRUE(fs::exists(folder_ / "poses/snapshots/x40"));
+}
+
+TEST_F(PhotoModelsTest, AreExtendedUnlessPhotosWouldBeLost) {
+  const std::string first = prepared("first", numbers(0, 18)), more = prepared("more", numbers(0, 25)),
+                    less = prepared("less", numbers(0, 10));
+  const auto mapper = [&](const std::string& result) {
+    return models("if [ -n \"$input_path\" ]; then cp " + result + "/* $output_path; else mkdir $output_path/0; cp " +
+                  first + "/* $output_path/0; fi");
+  };
+  PhotoModels lost = mapper(less);
+  lost.map(false, ignore);
+  lost.extend(false, ignore);
+  EXPECT_EQ(lost.unplaced(), numbers(18, 50));
+  PhotoModels extended = mapper(more);
+  extended.extend(false, ignore);
+  EXPECT_EQ(extended.unplaced(), numbers(25, 50));
+  EXPECT_FALSE(fs::exists(folder_ / "poses/extended.partial"));
+}
+
+// A program that maps three models, of which the merger can join the second with the first.
+std::string joiningScript(const std::string& a, const std::string& b, const std::string& c, const std::string& both) {
+  return "case $command in mapper) cp -r " + a + " $output_path/0; cp -r " + b + " $output_path/1; cp -r " + c +
+         " $output_path/2;;\n"
+         "model_merger) case $input_path2 in */1) cp " +
+         both +
+         "/* $output_path;; *) cp $input_path1/* $output_path;; esac;;\n"
+         "point_triangulator|bundle_adjuster) cp $input_path/* $output_path;; esac";
+}
+
+TEST_F(PhotoModelsTest, AreJoinedWhereTheySharePhotos) {
+  PhotoModels estimated = models(joiningScript(prepared("a", numbers(0, 20)), prepared("b", numbers(17, 30)),
+                                               prepared("c", numbers(18, 24)), prepared("both", numbers(0, 30))));
+  estimated.map(false, ignore);
+  EXPECT_EQ(estimated.countMapped().models, 3u);
+  EXPECT_EQ(estimated.countMapped().photos, 30u);
+  EXPECT_EQ(estimated.unplaced(), numbers(20, 50));
+  // The merger writes the first model if it fails, as for the third here.
+  EXPECT_EQ(estimated.join(ignore), 1);
+  EXPECT_EQ(estimated.unplaced(), numbers(30, 50));
+  estimated.map(false, ignore);
+  EXPECT_EQ(estimated.unplaced(), numbers(20, 50)) << "new models replace what came of those before";
+}
+
+TEST_F(PhotoModelsTest, AreNotJoinedIfTheyShareTooFewPhotos) {
+  PhotoModels estimated = models(joiningScript(prepared("a", numbers(0, 20)), prepared("b", numbers(18, 30)),
+                                               prepared("c", numbers(40, 45)), prepared("both", numbers(0, 30))));
+  estimated.map(false, ignore);
+  EXPECT_EQ(estimated.join(ignore), 0);
+  EXPECT_EQ(estimated.unplaced(), numbers(20, 50));
+}
+
+TEST_F(PhotoModelsTest, AreNotJoinedAgainstGps) {
+  // Photos of `a` stand on a square of 60 m, as their fixes say; those of the joined model do not.
+  for (int i = 0; i < 30; ++i) {
+    GpsFix gps;
+    gps.latitude = 50 + 1e-4 * i;
+    gps.longitude = 8 + 1e-4 * (i % 3);
+    list_.photos[static_cast<size_t>(i)].tags.gps = gps;
+  }
+  const auto write = [&](const std::string& name, int begin, int end, double bend) {
+    const std::string path = prepared(name, numbers(begin, end));
+    Bytes images = readFile(folder_ / name / "images.bin");
+    size_t at = 8;
+    for (int i = begin; i < end; ++i) {
+      // The camera-from-world translation of a camera without rotation is the negative of its place.
+      const double place[] = {-7.15 * (i % 3), -11.1 * i - bend * std::max(0, i - 20), 0};
+      std::memcpy(images.data() + at + 36, place, sizeof place);
+      at += 36 + 24 + 4 + 1 + std::string("p.jpg").size() + std::to_string(i).size() + 8;
+    }
+    writeFileAtomically(folder_ / name / "images.bin", images);
+    return path;
+  };
+  const std::string a = write("a", 0, 20, 0), b = write("b", 17, 30, 0), c = prepared("c", numbers(40, 45));
+  PhotoModels bent = models(joiningScript(a, b, c, write("bent", 0, 30, 40)));
+  bent.map(false, ignore);
+  EXPECT_EQ(bent.join(ignore), 0);
+  PhotoModels straight = models(joiningScript(a, b, c, write("straight", 0, 30, 0)));
+  straight.map(false, ignore);
+  EXPECT_EQ(straight.join(ignore), 1);
+}
+
+// A program whose bundle adjustment sets these parameters of a lens with eight; it keeps others.
+std::string adjustingScript(const std::string& model, const std::string& adjusted) {
+  return "case $command in mapper) cp -r " + model +
+         " $output_path/0;;\n"
+         "bundle_adjuster) echo $BundleAdjustment_refine_principal_point >> " +
+         model +
+         "/../options; cp $input_path/* $output_path; if [ $(stat -c %s $input_path/cameras.bin) -gt 72 ]; then cp " +
+         adjusted + "/cameras.bin $output_path; fi;; esac";
+}
+
+TEST_F(PhotoModelsTest, AreAdjustedWithAFullLensIfThereAreManyPhotos) {
+  const FakeLens adjusted{4, {627, 628, 403, 298, -0.02, 0.006, 3e-4, -2e-4}};
+  PhotoModels estimated = models(adjustingScript(prepared("a", numbers(0, 45)), prepared("adjusted", {0}, adjusted)));
+  estimated.map(false, ignore);
+  estimated.adjust(ignore);
+  EXPECT_EQ(readTextFile(folder_ / "options"), "1\n");
+  EXPECT_EQ(adjustedCamera().lens, LensModel::openCv);
+  EXPECT_EQ(adjustedCamera().centreX(), 403);
+  EXPECT_EQ(estimated.read().capture.photos.size(), 45u);
+}
+
+TEST_F(PhotoModelsTest, KeepASimpleLensIfThereAreFewPhotos) {
+  PhotoModels estimated = models(adjustingScript(prepared("a", numbers(0, 12)), "none"));
+  estimated.map(false, ignore);
+  estimated.adjust(ignore);
+  EXPECT_EQ(readTextFile(folder_ / "options"), "0\n");
+  EXPECT_EQ(adjustedCamera().lens, LensModel::radial);
+  EXPECT_EQ(adjustedCamera().parameters[0], 640);
+}
+
+TEST_F(PhotoModelsTest, AreAdjustedWithASimpleLensIfAFullOneIsNotPlausible) {
+  const FakeLens adjusted{4, {627, 628, 700, 298, 0, 0, 0, 0}};
+  PhotoModels estimated = models(adjustingScript(prepared("a", numbers(0, 45)), prepared("adjusted", {0}, adjusted)));
+  estimated.map(false, ignore);
+  estimated.adjust(ignore);
+  EXPECT_EQ(readTextFile(folder_ / "options"), "1\n0\n");
+  EXPECT_EQ(adjustedCamera().lens, LensModel::radial);
+}
+
+}  // namespace
+}  // namespace tessera
