@@ -24,6 +24,8 @@ class PhotoMatches {
   void extractFeatures(const Watch& watch);
   // Removes features and matches, which belong to other photos. Throws Error if a file cannot be removed.
   void discard() const;
+  // Returns for each photo those that look like it. Features must have been extracted.
+  LookAlikes findLookAlikes(const Watch& watch);
   void discardMatches() const;
   // Compares pairs that have not been compared yet.
   void match(const std::vector<PhotoPair>& pairs, const Watch& watch);

@@ -2,20 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
 #include <numeric>
 #include <set>
 
+#include "base/order_statistics.h"
 #include "import/georeference.h"
 
 namespace tessera {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
-constexpr int kSamples = 7;                              // of a footprint, along each side
-constexpr double kUnknownFocal = 0.8;                    // of the longer side, as in most drones
-constexpr double kLeastHeight = 5, kUnknownHeight = 80;  // metres
+constexpr int kSamples = 7;                                                     // of a footprint, along each side
+constexpr double kUnknownFocal = 0.8;                                           // of the longer side, as in most drones
+constexpr double kLeastHeight = 5, kUnknownHeight = 80, kGreatestHeight = 500;  // metres
+// Of the distance of neighbouring photos, the side of the footprint of a survey with an overlap of 80 %.
+constexpr double kSideOfDistance = 5;
 // Footprints end where rays are so near the horizon that they go farther than this many heights.
 constexpr double kFarthestHeights = 6;
 
@@ -47,6 +51,10 @@ Mat3d rotationFromGimbal(const GimbalAngles& gimbal) {
   return rotation * Eigen::AngleAxisd(gimbal.roll * kDegree, Vec3d::UnitZ()).toRotationMatrix();
 }
 
+double focalLength(const CameraBody& body) {
+  return body.focalLength > 0 ? body.focalLength : kUnknownFocal * std::max(body.width, body.height);
+}
+
 Footprint makeFootprint(const PhotoList& list, int photo, const Vec3d& eye) {
   const ListedPhoto& p = list.photos[static_cast<size_t>(photo)];
   const CameraBody& body = list.bodies[static_cast<size_t>(p.body)];
@@ -54,7 +62,7 @@ Footprint makeFootprint(const PhotoList& list, int photo, const Vec3d& eye) {
   print.photo = photo;
   print.eye = eye;
   print.worldFromCamera = rotationFromGimbal(p.tags.gimbal.value_or(GimbalAngles{0, -90, 0}));
-  const double focal = body.focalLength > 0 ? body.focalLength : kUnknownFocal * std::max(body.width, body.height);
+  const double focal = focalLength(body);
   print.slopeX = 0.5 * body.width / focal;
   print.slopeY = 0.5 * body.height / focal;
   // Nothing says how a photo without gimbal angles is turned about the vertical: its footprint is a square.
@@ -74,6 +82,28 @@ Footprint makeFootprint(const PhotoList& list, int photo, const Vec3d& eye) {
   return print;
 }
 
+// Returns the height above the ground of photos of which no tag states it.
+double unknownHeight(const PhotoList& list, const std::vector<int>& photos, const std::vector<Vec2d>& places) {
+  std::vector<double> heights, distances, slopes;
+  for (const int photo : photos) {
+    const ListedPhoto& p = list.photos[static_cast<size_t>(photo)];
+    if (p.tags.gps->relativeAltitude > kLeastHeight) heights.push_back(p.tags.gps->relativeAltitude);
+    const CameraBody& body = list.bodies[static_cast<size_t>(p.body)];
+    slopes.push_back(std::min(body.width, body.height) / focalLength(body));
+  }
+  if (!heights.empty()) return upperMedian(heights);
+  for (const Vec2d& place : places) {
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Vec2d& other : places) {
+      const double distance = (place - other).norm();
+      if (distance > 1) nearest = std::min(nearest, distance);  // photos of one stop say nothing
+    }
+    if (std::isfinite(nearest)) distances.push_back(nearest);
+  }
+  if (distances.empty()) return kUnknownHeight;
+  return std::clamp(kSideOfDistance * upperMedian(distances) / upperMedian(slopes), kLeastHeight, kGreatestHeight);
+}
+
 std::vector<Footprint> footprints(const PhotoList& list) {
   GeoFrame frame;
   int fixes = 0;
@@ -83,13 +113,20 @@ std::vector<Footprint> footprints(const PhotoList& list) {
     frame.latitude += photo.tags.gps->latitude / fixes;
     frame.longitude += photo.tags.gps->longitude / fixes;
   }
-  std::vector<Footprint> prints;
+  std::vector<int> photos;
+  std::vector<Vec2d> places;
   for (size_t i = 0; i < list.photos.size(); ++i) {
     const auto& gps = list.photos[i].tags.gps;
     if (!gps) continue;
-    Vec3d eye = enuFromGps(frame, gps->latitude, gps->longitude, 0);
-    eye.z() = gps->relativeAltitude > kLeastHeight ? gps->relativeAltitude : kUnknownHeight;
-    prints.push_back(makeFootprint(list, static_cast<int>(i), eye));
+    photos.push_back(static_cast<int>(i));
+    places.push_back(enuFromGps(frame, gps->latitude, gps->longitude, 0).head<2>());
+  }
+  const double unknown = unknownHeight(list, photos, places);
+  std::vector<Footprint> prints;
+  for (size_t k = 0; k < photos.size(); ++k) {
+    const double height = list.photos[static_cast<size_t>(photos[k])].tags.gps->relativeAltitude;
+    prints.push_back(
+        makeFootprint(list, photos[k], Vec3d(places[k].x(), places[k].y(), height > kLeastHeight ? height : unknown)));
   }
   return prints;
 }
@@ -179,9 +216,27 @@ void pairByFootprint(const PhotoList& list, const PairOptions& options, std::set
   }
 }
 
+void pairLookAlikes(const PhotoList& list, const LookAlikes& lookAlikes, int partners, std::set<PhotoPair>& pairs) {
+  for (size_t i = 0; i < lookAlikes.size(); ++i) {
+    int count = 0;
+    for (const int other : lookAlikes[i]) {
+      const auto o = static_cast<size_t>(other);
+      if (count == partners) break;
+      if (other == static_cast<int>(i)) continue;
+      ++count;
+      if (!list.photos[i].tags.gps || !list.photos[o].tags.gps) pairs.insert(inOrder(static_cast<int>(i), other));
+    }
+  }
+}
+
 }  // namespace
 
-std::vector<PhotoPair> choosePairs(const PhotoList& list, const PairOptions& options) {
+bool needsLookAlikes(const PhotoList& list, const PairOptions& options) {
+  return static_cast<int>(list.photos.size()) > options.all &&
+         std::any_of(list.photos.begin(), list.photos.end(), [](const ListedPhoto& photo) { return !photo.tags.gps; });
+}
+
+std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& lookAlikes, const PairOptions& options) {
   std::set<PhotoPair> pairs;
   const int count = static_cast<int>(list.photos.size());
   if (count <= options.all) {
@@ -194,18 +249,21 @@ std::vector<PhotoPair> choosePairs(const PhotoList& list, const PairOptions& opt
   const bool hasGps = 2 * fixes >= count;
   pairInSequence(list, hasGps ? options.neighbours : options.sequence, pairs);
   if (hasGps) pairByFootprint(list, options, pairs);
+  pairLookAlikes(list, lookAlikes, options.lookAlikes, pairs);
   return {pairs.begin(), pairs.end()};
 }
 
-std::vector<PhotoPair> chooseMorePairs(const PhotoList& list, const std::vector<int>& photos) {
+std::vector<PhotoPair> chooseMorePairs(const PhotoList& list, const LookAlikes& lookAlikes,
+                                       const std::vector<int>& photos) {
   const PairOptions wide{.all = 0,
                          .partners = 40,
                          .otherFlight = 20,
                          .neighbours = 10,
                          .sequence = 40,
+                         .lookAlikes = kMaxLookAlikes,
                          .minOverlap = 0.02,
                          .maxAngle = 90};
-  std::vector<PhotoPair> pairs = choosePairs(list, wide);
+  std::vector<PhotoPair> pairs = choosePairs(list, lookAlikes, wide);
   std::erase_if(pairs, [&](const PhotoPair& pair) {
     return std::find(photos.begin(), photos.end(), pair.first) == photos.end() &&
            std::find(photos.begin(), photos.end(), pair.second) == photos.end();

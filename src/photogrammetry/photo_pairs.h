@@ -9,6 +9,8 @@
 
 namespace tessera {
 
+inline constexpr int kMaxLookAlikes = 50;  // of a photo, that are of use
+
 using PhotoPair = std::pair<int, int>;  // indices into PhotoList::photos, the smaller one first
 
 struct PairOptions {
@@ -17,15 +19,26 @@ struct PairOptions {
   int otherFlight = 4;      // with how many photos of each other flight that overlaps, at least
   int neighbours = 2;       // in the sequence of a flight, to each side
   int sequence = 10;        // neighbours to each side if there is no GPS
+  int lookAlikes = 20;      // with how many photos that look alike a photo without GPS is paired
   double minOverlap = 0.2;  // share of a photo's pixels
   double maxAngle = 50;     // degrees between the optical axes
 };
 
+// For each photo of a list, others that look like it, the most similar one first: indices into the list.
+using LookAlikes = std::vector<std::vector<int>>;
+
+// Whether the choice of pairs needs look-alikes: some of too many photos for all pairs have no GPS.
+bool needsLookAlikes(const PhotoList& list, const PairOptions& options = {});
+
 // Returns the pairs, sorted. With GPS, footprints on the ground decide, for photos without gimbal angles as if they
-// looked straight down; all photos with GPS are connected.
-std::vector<PhotoPair> choosePairs(const PhotoList& list, const PairOptions& options = {});
+// looked straight down; photos with GPS whose footprints overlap are connected. Heights above the ground that are not
+// known are those of the other photos, or follow from the distances of the photos. Photos without GPS are paired with
+// those that look alike; `lookAlikes` may be empty.
+std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& lookAlikes,
+                                   const PairOptions& options = {});
 
 // Returns more pairs for photos that these have not connected with the others: all that may show the same places.
-std::vector<PhotoPair> chooseMorePairs(const PhotoList& list, const std::vector<int>& photos);
+std::vector<PhotoPair> chooseMorePairs(const PhotoList& list, const LookAlikes& lookAlikes,
+                                       const std::vector<int>& photos);
 
 }  // namespace tessera

@@ -7,6 +7,8 @@
 #include <numeric>
 #include <set>
 
+#include "photogrammetry/look_alikes.h"
+
 namespace tessera {
 namespace {
 
@@ -51,12 +53,12 @@ int groups(const PhotoList& list, const std::vector<PhotoPair>& pairs) {
 }
 
 TEST(PhotoPairs, AreAllOfAFewPhotos) {
-  EXPECT_EQ(choosePairs(survey(4, 5, 15)).size(), 20u * 19 / 2);
+  EXPECT_EQ(choosePairs(survey(4, 5, 15), {}).size(), 20u * 19 / 2);
 }
 
 TEST(PhotoPairs, AreThoseThatOverlap) {
   const PhotoList list = survey(12, 12, 15);
-  const std::vector<PhotoPair> pairs = choosePairs(list);
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
   EXPECT_LE(pairs.size(), 144u * 16);
   EXPECT_GE(pairs.size(), 144u * 5);
   EXPECT_EQ(groups(list, pairs), 1);
@@ -78,7 +80,7 @@ TEST(PhotoPairs, ConnectFlightsOfOtherHeightsAndAngles) {
     list.photos.push_back(photoAt(15.0 * k, 45, 120, {0, -90, 0}, 1, 1000 + 3 * k));
     list.photos.push_back(photoAt(15.0 * k, -5, 60, {0, -50, 0}, 2, 2000 + 3 * k));
   }
-  const std::vector<PhotoPair> pairs = choosePairs(list);
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
   EXPECT_EQ(groups(list, pairs), 1);
   for (size_t i = 49; i < list.photos.size(); ++i) {
     const int own = list.photos[i].flight;
@@ -95,16 +97,63 @@ TEST(PhotoPairs, AreNotMadeOfPhotosThatLookAway) {
   // In the middle of the survey, but the ground that it shows is far to the north.
   list.photos.push_back(photoAt(45, 45, 60, {0, -15, 0}, 1, 1000));
   int partners = 0;
-  for (const auto& [a, b] : choosePairs(list)) partners += b == 49 ? 1 : 0;
+  for (const auto& [a, b] : choosePairs(list, {})) partners += b == 49 ? 1 : 0;
   EXPECT_LE(partners, 1) << "only what the spanning tree needs";
 }
 
 TEST(PhotoPairs, FollowTheSequenceWithoutGps) {
   PhotoList list = survey(7, 7, 15);
   for (ListedPhoto& photo : list.photos) photo.tags.gps.reset();
-  const std::vector<PhotoPair> pairs = choosePairs(list);
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
   EXPECT_EQ(pairs.size(), 49u * 10 - 55);
   for (const auto& [a, b] : pairs) EXPECT_LE(b - a, 10);
+}
+
+TEST(PhotoPairs, OfPhotosWithoutGpsAreThoseThatLookAlike) {
+  PhotoList list = survey(6, 10, 15);
+  EXPECT_FALSE(needsLookAlikes(list));
+  for (ListedPhoto& photo : list.photos) photo.tags.gps.reset();
+  EXPECT_TRUE(needsLookAlikes(list));
+  EXPECT_FALSE(needsLookAlikes(list, {.all = 60})) << "all pairs are compared anyway";
+  LookAlikes lookAlikes(60);
+  lookAlikes[0] = {0, 30, 40, 50};
+  const PairOptions options{.sequence = 1, .lookAlikes = 2};
+  const std::vector<PhotoPair> pairs = choosePairs(list, lookAlikes, options);
+  EXPECT_EQ(pairs.size(), 59u + 2);
+  EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(), PhotoPair(0, 40)));
+  EXPECT_FALSE(std::binary_search(pairs.begin(), pairs.end(), PhotoPair(0, 50)));
+  const std::vector<PhotoPair> more = chooseMorePairs(list, lookAlikes, {50});
+  EXPECT_TRUE(std::binary_search(more.begin(), more.end(), PhotoPair(0, 50)));
+  EXPECT_FALSE(std::binary_search(more.begin(), more.end(), PhotoPair(0, 40))) << "neither of them lacks a pose";
+}
+
+// Photos with GPS alone: their distances tell how high they are, and so which lines overlap.
+TEST(PhotoPairs, FollowFromDistancesIfHeightsAreUnknown) {
+  for (const double step : {2.0, 15.0, 60.0}) {
+    PhotoList list = survey(8, 8, step);
+    for (ListedPhoto& photo : list.photos) {
+      photo.tags.gps->relativeAltitude = 0;
+      photo.tags.gimbal.reset();
+    }
+    const std::vector<PhotoPair> pairs = choosePairs(list, {});
+    EXPECT_EQ(groups(list, pairs), 1) << step;
+    // Photo 19 is the fourth of the third line; 28 stands beside it, in the fourth line.
+    EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(), PhotoPair(19, 28))) << step;
+  }
+}
+
+TEST(LookAlikes, AreThoseThatTheProgramPrints) {
+  const PhotoList list = survey(1, 4, 15);
+  PhotoList named = list;
+  for (size_t i = 0; i < 4; ++i) named.photos[i].safeName = "p" + std::to_string(i) + ".jpg";
+  const LookAlikes lookAlikes = parseLookAlikes(
+      "Indexing image [1/2] in 0.1s\n  image_id=1, image_name=p3.jpg, score=0.1\n"
+      "Querying for image p0.jpg [1/2] in 0.141s\n  image_id=1, image_name=p0.jpg, score=0.45\n"
+      "  image_id=3, image_name=p2.jpg, score=0.10\n  image_id=9, image_name=p9.jpg, score=0.10\n"
+      "  image_id=2, image_name=p1.jpg, score=0.09\nQuerying for image p7.jpg [2/2] in 0.1s\n"
+      "  image_id=1, image_name=p0.jpg, score=0.45\nQuerying for image p3.jpg [2/2] in 0.1s\n  image_name=p1.jpg, sc",
+      named);
+  EXPECT_EQ(lookAlikes, (LookAlikes{{2, 1}, {}, {}, {1}}));
 }
 
 }  // namespace

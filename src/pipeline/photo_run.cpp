@@ -52,6 +52,36 @@ Json toJson(const Georeference& fit, const std::vector<Photo>& photos) {
   return json;
 }
 
+struct ChosenPairs {
+  std::vector<PhotoPair> pairs;
+  LookAlikes lookAlikes;
+};
+
+// Reads what the stage `pairs` has written. Throws Error if the file is damaged.
+ChosenPairs readPairs(const fs::path& file, size_t photos) {
+  const Json json = Json::parse(readTextFile(file), nullptr, false);
+  const Error damaged(file.string(), "", "does not describe pairs of these photos", "run again with --from pairs");
+  const auto isPhoto = [photos](const Json& number) {
+    return number.is_number_unsigned() && number.get<uint64_t>() < photos;
+  };
+  const auto isList = [&](const Json& list) {
+    return list.is_array() && std::all_of(list.begin(), list.end(), isPhoto);
+  };
+  const auto hasLists = [&](const char* key) {
+    return json.is_object() && json.contains(key) && json[key].is_array() &&
+           std::all_of(json[key].begin(), json[key].end(), isList);
+  };
+  if (!hasLists("pairs") || !hasLists("look_alikes")) throw damaged;
+  ChosenPairs chosen;
+  for (const Json& pair : json["pairs"]) {
+    if (pair.size() != 2 || pair[0] >= pair[1]) throw damaged;
+    chosen.pairs.emplace_back(pair[0].get<int>(), pair[1].get<int>());
+  }
+  chosen.lookAlikes = json["look_alikes"].get<LookAlikes>();
+  if (!chosen.lookAlikes.empty() && chosen.lookAlikes.size() != photos) throw damaged;
+  return chosen;
+}
+
 class PhotoRun {
  public:
   explicit PhotoRun(const PhotoRunOptions& options) : options_(options) {
@@ -133,6 +163,8 @@ class PhotoRun {
     };
   }
 
+  fs::path pairsFile() const { return out("poses/pairs.json"); }
+
   void stopIfInterrupted() const {
     if (options_.interrupted()) throw RunInterrupted();
   }
@@ -174,13 +206,24 @@ class PhotoRun {
   }
 
   StageOutcome pairs() {
-    const std::vector<PhotoPair> chosen = choosePairs(list_);
-    writeFileAtomically(out("poses/pairs.json"), Json(chosen).dump());
-    return {0, fmt::format("{} of {}", chosen.size(), list_.photos.size() * (list_.photos.size() - 1) / 2)};
+    LookAlikes lookAlikes;
+    if (needsLookAlikes(list_)) {
+      try {
+        inform("some photos have no GPS: photos that look alike are searched for");
+        lookAlikes = matches_->findLookAlikes([this](int64_t) { stopIfInterrupted(); });
+      } catch (const Error& error) {
+        warn("photos without GPS are only compared with those before and after them: {}", error.what());
+      }
+    }
+    const std::vector<PhotoPair> chosen = choosePairs(list_, lookAlikes);
+    const Json described = {{"pairs", chosen}, {"look_alikes", lookAlikes}};
+    writeFileAtomically(pairsFile(), described.dump());
+    return {matches_->takePeakBytes(),
+            fmt::format("{} of {}", chosen.size(), list_.photos.size() * (list_.photos.size() - 1) / 2)};
   }
 
   StageOutcome matches() {
-    const std::vector<PhotoPair> chosen = choosePairs(list_);
+    const std::vector<PhotoPair> chosen = readPairs(pairsFile(), list_.photos.size()).pairs;
     Progress progress("matches", static_cast<int64_t>(chosen.size()), "pairs");
     matches_->match(chosen, watch(progress));
     const size_t linked = matches_->linkedPairs();
@@ -209,7 +252,8 @@ class PhotoRun {
       inform("{} photos could not be placed; they are compared with more of the others", missing.size());
       try {
         Progress progress("remapping", static_cast<int64_t>(list_.photos.size()), "photos");
-        matches_->match(chooseMorePairs(list_, missing), [this](int64_t) { stopIfInterrupted(); });
+        const LookAlikes lookAlikes = readPairs(pairsFile(), list_.photos.size()).lookAlikes;
+        matches_->match(chooseMorePairs(list_, lookAlikes, missing), [this](int64_t) { stopIfInterrupted(); });
         models_->extend(resumes, watch(progress));
       } catch (const Error& error) {
         warn("no photos could be added: {}", error.what());
