@@ -55,8 +55,9 @@ TEST_F(RunCommandLine, NamesWhatToInstallAndWhichStagesThereAre) {
   Said said = run({"--until", "dinner"});
   EXPECT_EQ(said.exitCode, 1);
   EXPECT_TRUE(
-      contains(said.err, "name one of inspect, features, pairs, matches, mapping, remapping, adjusting, georeferencing, capture, "
-                         "train, bake, evaluate"))
+      contains(said.err,
+               "name one of inspect, features, pairs, matches, mapping, remapping, adjusting, georeferencing, capture, "
+               "train, bake, evaluate"))
       << said.err;
   const std::string path = std::getenv("PATH");
   ::setenv("PATH", "/nowhere", 1);

@@ -159,6 +159,7 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
       tags.gps->relativeAltitude = *xmp.relativeAltitude;
     }
     tags.camera.isThermal = xmp.isInfrared;
+    tags.camera.isPanorama = xmp.isPanorama;
     if (xmp.gimbalPitch && std::abs(*xmp.gimbalPitch) <= 180) {
       tags.gimbal = GimbalAngles{xmp.gimbalYaw.value_or(0), *xmp.gimbalPitch, xmp.gimbalRoll.value_or(0)};
     }

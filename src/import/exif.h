@@ -27,6 +27,8 @@ struct CameraTags {
   double pixelsPerMillimetre = 0;  // of the sensor, along its width
   bool isThermal = false;          // an infrared camera beside the one for visible light, as the XMP says
 
+  bool isPanorama = false;         // the picture is a map of the sphere around the camera, as the XMP says
+
   bool operator==(const CameraTags&) const = default;
 };
 
@@ -53,6 +55,7 @@ struct XmpTags {
   std::optional<double> latitude, longitude, absoluteAltitude, relativeAltitude;
   std::optional<double> gimbalYaw, gimbalPitch, gimbalRoll;
   bool isInfrared = false;  // ImageSource, of drones with several cameras
+  bool isPanorama = false;  // ProjectionType of Google's GPano
 };
 XmpTags decodeXmp(std::string_view xmp);
 

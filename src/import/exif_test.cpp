@@ -32,6 +32,8 @@ TEST(Xmp, ReadsElements) {
 TEST(Xmp, TellsInfraredPicturesOfTwoCameras) {
   EXPECT_TRUE(decodeXmp("drone-dji:ImageSource=\"InfraredCamera\"").isInfrared);
   EXPECT_FALSE(decodeXmp("drone-dji:ImageSource=\"WideCamera\"").isInfrared);
+  EXPECT_TRUE(decodeXmp("<GPano:ProjectionType>equirectangular</GPano:ProjectionType>").isPanorama);
+  EXPECT_FALSE(decodeXmp("GPano:ProjectionType=\"rectilinear\"").isPanorama);
   EXPECT_FALSE(decodeXmp("drone-dji:GimbalYawDegree=\"1\"").isInfrared);
 }
 

@@ -75,6 +75,10 @@ XmpTags decodeXmp(std::string_view xmp) {
     tags.isInfrared = value.find("Infrared") != value.npos;
     return true;
   });
+  visitValues(xmp, "ProjectionType", [&tags](std::string_view value) {
+    tags.isPanorama = value == "equirectangular" || value == "cylindrical";
+    return true;
+  });
   return tags;
 }
 

@@ -10,6 +10,7 @@
 #include <tuple>
 
 #include "base/error.h"
+#include "base/image_codecs.h"
 #include "base/image_io.h"
 #include "base/log.h"
 #include "import/clean.h"
@@ -32,11 +33,23 @@ uint64_t contentHash(std::span<const std::byte> bytes) {
   return hash;
 }
 
-bool isPhotoName(const fs::path& path) {
+std::string extensionInLowerCase(const fs::path& path) {
   std::string extension = path.extension().string();
   std::transform(extension.begin(), extension.end(), extension.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+bool isPhotoName(const fs::path& path) {
+  const std::string extension = extensionInLowerCase(path);
   return extension == ".jpg" || extension == ".jpeg" || extension == ".png";
+}
+
+// Photos in formats that only other programs read.
+bool isOtherFormat(const fs::path& path) {
+  static const std::set<std::string> extensions{".arw", ".avif", ".cr2", ".cr3", ".dng", ".heic", ".heif", ".jp2",
+                                                ".nef", ".orf",  ".raf", ".rw2", ".tif", ".tiff", ".webp"};
+  return extensions.contains(extensionInLowerCase(path));
 }
 
 std::vector<fs::path> photoFiles(const fs::path& folder) {
@@ -49,7 +62,7 @@ std::vector<fs::path> photoFiles(const fs::path& folder) {
     const bool isHidden = last.filename().string().starts_with(".");
     std::error_code ignored;
     if (isHidden && at->is_directory(ignored)) at.disable_recursion_pending();
-    if (!isHidden && isPhotoName(last) && at->is_regular_file(ignored)) files.push_back(last);
+    if (!isHidden && (isPhotoName(last) || isOtherFormat(last)) && at->is_regular_file(ignored)) files.push_back(last);
   }
   // A shorter list would be taken for other photos, and poses of all would be lost.
   if (status) throw Error(last.string(), "", "cannot be listed: " + status.message(), "make it readable, or remove it");
@@ -65,6 +78,8 @@ Header readHeader(const fs::path& file) {
     header.hash = contentHash(head);
     const auto info = probeImage(head);
     if (!info || info->format == ImageInfo::Format::exr) return header;
+    // Of a size that a few bytes cannot contain; other programs would take the memory for it.
+    if (!image_codecs::isPlausible(info->width, info->height, header.fileBytes, {})) return header;
     header.width = info->width;
     header.height = info->height;
     header.tags = decodePhotoTags(head);
@@ -143,7 +158,9 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
   std::sort(files.begin(), files.end(),
             [](const fs::path& a, const fs::path& b) { return naturalLess(a.string(), b.string()); });
   std::vector<Header> headers(files.size());
-  pool.run(files.size(), [&](size_t i, int) { headers[i] = readHeader(files[i]); });
+  pool.run(files.size(), [&](size_t i, int) {
+    if (isPhotoName(files[i])) headers[i] = readHeader(files[i]);
+  });
 
   PhotoList list;
   std::map<std::string, int> bodies;
@@ -154,8 +171,16 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
   for (size_t i = 0; i < files.size(); ++i) {
     const Header& header = headers[i];
     const std::string name = files[i].lexically_relative(folder).generic_string();
+    if (isOtherFormat(files[i])) {
+      list.leftOut.push_back({name, "in a format that is not read; convert it to JPEG"});
+      continue;
+    }
     if (header.width == 0) {
       list.leftOut.push_back({name, "not readable as JPEG or PNG"});
+      continue;
+    }
+    if (header.tags.camera.isPanorama) {
+      list.leftOut.push_back({name, "a panorama, whose lens is not supported"});
       continue;
     }
     if (header.tags.camera.isThermal && hasVisible) {

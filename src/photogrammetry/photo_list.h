@@ -40,9 +40,9 @@ struct PhotoList {
 
 inline constexpr double kPauseBetweenFlights = 300;  // seconds
 
-// Lists the JPEG and PNG files below a folder. Leaves out files that cannot be read, copies of other photos, and
-// infrared pictures beside visible ones. Hidden files and folders are ignored. Throws Error if the folder cannot be
-// read.
+// Lists the JPEG and PNG files below a folder. Leaves out files that cannot be read, photos in other formats, copies of
+// other photos, panoramas, and infrared pictures beside visible ones. Hidden files and folders are ignored. Throws
+// Error if the folder cannot be read.
 PhotoList listPhotos(const fs::path& folder, ThreadPool& pool);
 
 // Warns of the photos, once for each reason.

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "base/error.h"
+#include "base/image_io.h"
 #include "photogrammetry/colmap_database.h"
 #include "photogrammetry/look_alikes.h"
 
@@ -22,6 +23,14 @@ void linkPhoto(const fs::path& photo, const fs::path& link) {
   fs::remove(link, status);
   fs::create_symlink(photo, link, status);
   if (status) throw Error(link.string(), "", "cannot be made: " + status.message(), "name a folder on another disk");
+}
+
+bool isTruncated(const fs::path& file) {
+  try {
+    return readImage(file).truncated;
+  } catch (const Error&) {
+    return false;
+  }
 }
 
 }  // namespace
@@ -72,24 +81,32 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
          "--SiftExtraction.use_gpu", "0", "--SiftExtraction.num_threads", settings_.threadsText()},
         [&] { watch(done()); });
   }
-  if (done() == 0) throw Error(folder_.string(), "database.db", "no photo has features", "see features.log beside it");
+  int64_t features = 0;
+  for (const auto& [photo, number] : ColmapDatabase(database()).features()) features += number;
+  if (features == 0) {
+    throw Error((folder_ / "images").string(), "", "no photo has features",
+                "check that the photos show something sharp; features.log tells more");
+  }
 }
 
 LookAlikes PhotoMatches::findLookAlikes(const Watch& watch) {
   // More words and photos make it slower than they improve it: a city of 202 photos takes a minute and a half of two
   // cores.
   constexpr int64_t kFeaturesPerWord = 40, kMinWords = 64, kMaxWords = 4096;
-  constexpr int kPhotosForWords = 60, kFeaturesOfPhoto = 1500;
+  constexpr size_t kPhotosForWords = 60;
+  constexpr int kFeaturesOfPhoto = 1500;
   const fs::path words = folder_ / "words.bin", log = folder_ / "look_alikes.log";
   std::error_code status;
   if (!fs::exists(words, status)) {
     int64_t features = 0;
-    for (const auto& [photo, count] : ColmapDatabase(database()).features()) features += count;
+    const std::map<int, int> counts = ColmapDatabase(database()).features();
+    for (const auto& [photo, count] : counts) features += count;
     const fs::path partial = folder_ / "words.partial.bin";
     runColmap("words",
               {"vocab_tree_builder", "--database_path", database().string(), "--vocab_tree_path", partial.string(),
                "--num_visual_words", std::to_string(std::clamp(features / kFeaturesPerWord, kMinWords, kMaxWords)),
-               "--branching", "64", "--num_iterations", "5", "--max_num_images", std::to_string(kPhotosForWords)},
+               "--branching", "64", "--num_iterations", "5", "--max_num_images",
+               std::to_string(std::min(kPhotosForWords, counts.size()))},
               [&] { watch(0); });
     fs::rename(partial, words, status);
     if (status) throw Error(words.string(), "", "cannot be made: " + status.message(), "check the disk");
@@ -132,7 +149,7 @@ size_t PhotoMatches::linkedPairs() const {
   return linked;
 }
 
-std::vector<LeftOutPhoto> PhotoMatches::explain(const std::vector<int>& photos) const {
+std::vector<LeftOutPhoto> PhotoMatches::explain(const std::vector<int>& photos, const std::vector<int>& apart) const {
   const ColmapDatabase database(this->database());
   const std::map<int, int> features = database.features();
   std::map<int, int> links;
@@ -145,8 +162,13 @@ std::vector<LeftOutPhoto> PhotoMatches::explain(const std::vector<int>& photos) 
   for (const int i : photos) {
     const auto count = features.find(i);
     std::string reason = "not consistent with the others";
-    if (count == features.end()) {
+    const fs::path& file = list_.photos[static_cast<size_t>(i)].file;
+    if (std::binary_search(apart.begin(), apart.end(), i)) {
+      reason = "of another place: they match each other, but not the rest";
+    } else if (count == features.end()) {
       reason = "not decodable";
+    } else if (isTruncated(file)) {
+      reason = "truncated";
     } else if (count->second < kFewFeatures) {
       reason = "few features, as of water, sky or a blurred picture";
     } else if (!links.contains(i)) {

@@ -30,8 +30,9 @@ class PhotoMatches {
   // Compares pairs that have not been compared yet.
   void match(const std::vector<PhotoPair>& pairs, const Watch& watch);
   size_t linkedPairs() const;  // of those compared, the pairs that one geometry explains
-  // Returns these photos with the likely reason why no pose was found for them. `photos` are indices into the list.
-  std::vector<LeftOutPhoto> explain(const std::vector<int>& photos) const;
+  // Returns these photos with the likely reason why they are not in the model. `photos` are indices into the list, of
+  // which those in `apart` are in another model.
+  std::vector<LeftOutPhoto> explain(const std::vector<int>& photos, const std::vector<int>& apart) const;
 
   int64_t takePeakBytes() { return std::exchange(peakBytes_, 0); }  // of the programs run since the last call
 

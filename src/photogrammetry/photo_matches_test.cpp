@@ -87,10 +87,11 @@ TEST(PhotoMatches, SayWhyPhotosHaveNoPose) {
   sqlite3_close(handle);
   const PhotoList list = numberedPhotos(5);
   std::string reasons;
-  for (const LeftOutPhoto& photo : PhotoMatches(folder.path(), list, {}).explain({0, 2, 3, 4}))
+  for (const LeftOutPhoto& photo : PhotoMatches(folder.path(), list, {}).explain({0, 1, 2, 3, 4}, {1}))
     reasons += photo.name + ": " + photo.reason + "\n";
   EXPECT_EQ(reasons,
             "p0.jpg: not consistent with the others\n"
+            "p1.jpg: of another place: they match each other, but not the rest\n"
             "p2.jpg: few features, as of water, sky or a blurred picture\n"
             "p3.jpg: nothing in common with another photo\n"
             "p4.jpg: not decodable\n");

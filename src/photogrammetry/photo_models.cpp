@@ -24,6 +24,8 @@ constexpr size_t kPhotosForFullLens = 40;   // of a camera, from which on its pr
 constexpr double kFarthestCentre = 0.05;    // of the size of the picture, of a principal point from the middle
 constexpr const char* kAdjustments = "12";  // iterations: eight brought the change of the cost below one in a million
 
+constexpr const char* kNoModel = "failed to create sparse model";  // what the mapper says then
+
 // Returns the end of a log.
 std::string readEnd(const fs::path& log) {
   constexpr std::streamoff kTail = 1 << 14;
@@ -80,14 +82,24 @@ std::vector<Piece> piecesIn(const fs::path& folder) {
   return pieces;
 }
 
+// Returns the number of records that a file of a model states, which it begins with; 0 if it is missing.
+uint64_t statedCount(const fs::path& path) {
+  uint64_t count = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(reinterpret_cast<char*>(&count), sizeof count)) return 0;
+  return count;
+}
+
 // Returns the number of photos that a model states, without reading all of it; 0 if it is not complete.
 uint64_t statedPhotos(const fs::path& folder) {
   std::error_code status;
-  if (!fs::exists(folder / "points3D.bin", status)) return 0;
-  uint64_t count = 0;
-  std::ifstream file(folder / "images.bin", std::ios::binary);
-  if (!file.read(reinterpret_cast<char*>(&count), sizeof count)) return 0;
-  return count;
+  return fs::exists(folder / "points3D.bin", status) ? statedCount(folder / "images.bin") : 0;
+}
+
+// Whether the photos of a model see enough points to say how they stand. Those of a camera that only turns see none.
+bool isSupported(const Piece& piece) {
+  constexpr uint64_t kLeastPerPhoto = 10;
+  return statedCount(piece.folder / "points3D.bin") >= kLeastPerPhoto * piece.photos.size();
 }
 
 // Removes all but the snapshots with the most photos: together, they would grow with the square of the number of
@@ -232,7 +244,7 @@ void PhotoModels::map(bool resumes, const Watch& watch) {
     runMapper({}, partial, resumes, watch);
   } catch (const Error&) {
     // Without any model, the mapper reports failure, too.
-    if (readEnd(folder_ / "mapping.log").find("failed to create sparse model") == std::string::npos) throw;
+    if (readEnd(folder_ / "mapping.log").find(kNoModel) == std::string::npos) throw;
   }
   // Going on from a snapshot, it writes one model, into the folder itself.
   if (!photosIn(partial).empty()) {
@@ -240,14 +252,54 @@ void PhotoModels::map(bool resumes, const Watch& watch) {
     for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
       fs::rename(partial / name, partial / "0" / name);
   }
+  mapRest(partial, watch);
+  for (const Piece& piece : piecesIn(partial))
+    if (!isSupported(piece)) removeFolder(piece.folder);
   if (piecesIn(partial).empty()) {
-    throw Error(folder_.string(), "", "no two photos could be placed relative to each other",
-                "check that neighbouring photos overlap by more than half, and are sharp");
+    throw Error(
+        folder_.string(), "", "no two photos could be placed relative to each other",
+        "check that neighbouring photos overlap by more than half, are sharp, and were taken from different places");
   }
   replaceFolder(partial, folder_ / "sparse");
   // What came of the models before.
   discardAdjusted();
   discardJoined();
+}
+
+void PhotoModels::mapRest(const fs::path& models, const Watch& watch) {
+  const fs::path list = folder_ / "rest.txt", rest = folder_ / "rest.partial";
+  std::set<int> placed;
+  for (const Piece& piece : piecesIn(models)) placed.insert(piece.photos.begin(), piece.photos.end());
+  std::string names;
+  size_t count = 0;
+  for (size_t i = 0; i < list_.photos.size(); ++i) {
+    if (placed.contains(static_cast<int>(i))) continue;
+    names += list_.photos[i].safeName + "\n";
+    ++count;
+  }
+  if (placed.empty() || count < 3) return;
+  writeFileAtomically(list, names);
+  removeFolder(rest);
+  makeFolder(rest);
+  const fs::path log = folder_ / "mapping.log";
+  std::error_code status;
+  fs::remove(log, status);
+  try {
+    runColmap("mapping",
+              {"mapper", "--database_path", (folder_ / "database.db").string(), "--image_path",
+               (folder_ / "images").string(), "--output_path", rest.string(), "--image_list_path", list.string(),
+               "--Mapper.num_threads", settings_.threadsText(), "--Mapper.min_model_size", "3",
+               "--Mapper.init_min_tri_angle", "4", "--Mapper.init_min_num_inliers", "50"},
+              [&] { watch(static_cast<int64_t>(placed.size()) + lastRegistered(log)); });
+  } catch (const Error& error) {
+    if (readEnd(log).find(kNoModel) == std::string::npos) warn("no further models: {}", error.what());
+  }
+  for (const Piece& piece : piecesIn(rest)) {
+    fs::path place;
+    for (int i = 0; place.empty() || fs::exists(place, status); ++i) place = models / std::to_string(i);
+    fs::rename(piece.folder, place);
+  }
+  fs::remove_all(rest, status);
 }
 
 void PhotoModels::discardJoined() const {
@@ -391,6 +443,15 @@ std::vector<int> PhotoModels::unplaced() const {
   for (int i = 0; i < static_cast<int>(list_.photos.size()); ++i)
     if (!photos.contains(i)) missing.push_back(i);
   return missing;
+}
+
+std::vector<int> PhotoModels::placedApart() const {
+  const std::set<int> photos = photosIn(last(true));
+  std::set<int> apart;
+  for (const Piece& piece : piecesIn(folder_ / "sparse"))
+    for (const int photo : piece.photos)
+      if (!photos.contains(photo)) apart.insert(photo);
+  return {apart.begin(), apart.end()};
 }
 
 SourceCapture PhotoModels::readFrom(const fs::path& model) const {

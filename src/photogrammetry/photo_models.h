@@ -47,6 +47,8 @@ class PhotoModels {
   Count countMapped() const;
   // Returns the photos that the last model lacks: indices into the list, sorted.
   std::vector<int> unplaced() const;
+  // Of these, the photos of other models of `map`: sorted.
+  std::vector<int> placedApart() const;
   // Returns the last model, with photos under their own names.
   SourceCapture read() const;
 
@@ -54,6 +56,9 @@ class PhotoModels {
 
  private:
   fs::path last(bool adjusted) const;
+  // Adds models of the photos that are in none: once there is a model, the mapper begins no other unless a pair is very
+  // well connected.
+  void mapRest(const fs::path& models, const Watch& watch);
   void runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch);
   void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
   bool agreesWithGps(const fs::path& joined, const fs::path& before) const;

@@ -21,8 +21,8 @@ std::vector<int> numbers(int begin, int end) {
 // The models of one list of photos, made by a script in place of colmap.
 class PhotoModelsTest : public testing::Test {
  protected:
-  PhotoModels models(const std::string& script) {
-    return PhotoModels(folder_ / "poses", list_, {.program = writeColmap(folder_, script).string()});
+  PhotoModels models(const std::string& script, bool mapsRest = false) {
+    return PhotoModels(folder_ / "poses", list_, {.program = writeColmap(folder_, script, mapsRest).string()});
   }
   std::string prepared(const std::string& name, const std::vector<int>& photos, const FakeLens& lens = {}) {
     writeModel(folder_ / name, photos, lens);
@@ -39,6 +39,27 @@ TEST_F(PhotoModelsTest, SayThatNoPhotosCouldBePlaced) {
   const std::string message = errorMessage([&] { estimated.map(false, ignore); });
   EXPECT_NE(message.find("no two photos could be placed"), std::string::npos) << message;
   EXPECT_FALSE(fs::exists(folder_ / "poses/sparse"));
+}
+
+TEST_F(PhotoModelsTest, AreRefusedIfTheySeeHardlyAnyPoint) {
+  writeModel(folder_ / "turned", numbers(0, 5), {}, 40);
+  PhotoModels estimated = models("cp -r " + (folder_ / "turned").string() + " $output_path/0");
+  const std::string message = errorMessage([&] { estimated.map(false, ignore); });
+  EXPECT_NE(message.find("taken from different places"), std::string::npos) << message;
+}
+
+// The mapper makes no second model unless it is asked for one of the other photos.
+TEST_F(PhotoModelsTest, IncludeThoseOfPhotosThatTheFirstLacks) {
+  PhotoModels estimated =
+      models("if [ -n \"$image_list_path\" ]; then head -1 $image_list_path > " + (folder_ / "first").string() +
+                 "; cp -r " + prepared("b", numbers(20, 50)) + " $output_path/0; else cp -r " +
+                 prepared("a", numbers(0, 20)) + " $output_path/0; fi",
+             true);
+  estimated.map(false, ignore);
+  EXPECT_EQ(readTextFile(folder_ / "first"), "p20.jpg\n");
+  EXPECT_EQ(estimated.countMapped().models, 2u);
+  EXPECT_EQ(estimated.unplaced(), numbers(0, 20)) << "the larger one counts";
+  EXPECT_EQ(estimated.placedApart(), numbers(0, 20));
 }
 
 TEST_F(PhotoModelsTest, GoOnFromTheLastSnapshotThatIsWhole) {
@@ -106,6 +127,7 @@ TEST_F(PhotoModelsTest, AreJoinedWhereTheySharePhotos) {
   EXPECT_EQ(estimated.countMapped().models, 3u);
   EXPECT_EQ(estimated.countMapped().photos, 30u);
   EXPECT_EQ(estimated.unplaced(), numbers(20, 50));
+  EXPECT_EQ(estimated.placedApart(), numbers(20, 30));
   // The merger writes the first model if it fails, as for the third here.
   EXPECT_EQ(estimated.join(ignore), 1);
   EXPECT_EQ(estimated.unplaced(), numbers(30, 50));

@@ -87,12 +87,12 @@ class PhotoRun {
   explicit PhotoRun(const PhotoRunOptions& options) : options_(options) {
     ThreadPool pool(options.threads);
     list_ = listPhotos(options.photos, pool);
+    warnLeftOut(list_.leftOut);
     if (list_.photos.size() < 3) {
       throw Error(options.photos.string(), "",
                   fmt::format("holds {} photos that can be used; poses need three", list_.photos.size()),
                   "name a folder of JPEG or PNG photos");
     }
-    warnLeftOut(list_.leftOut);
     const ColmapSettings colmap{.threads = options.threads};
     matches_ = std::make_unique<PhotoMatches>(out("poses"), list_, colmap);
     models_ = std::make_unique<PhotoModels>(out("poses"), list_, colmap);
@@ -266,7 +266,7 @@ class PhotoRun {
 
   StageOutcome adjusting() {
     models_->adjust([this](int64_t) { stopIfInterrupted(); });
-    const std::vector<LeftOutPhoto> unplaced = matches_->explain(models_->unplaced());
+    const std::vector<LeftOutPhoto> unplaced = matches_->explain(models_->unplaced(), models_->placedApart());
     warnLeftOut(unplaced);
     return {models_->takePeakBytes(), placedText(unplaced.size())};
   }

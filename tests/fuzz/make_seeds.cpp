@@ -1,4 +1,6 @@
 // Writes a few small valid inputs for every fuzzer to DIR/<fuzzer>/, from which libFuzzer derives others.
+#include <sqlite3.h>
+
 #include <algorithm>
 #include <cstring>
 #include <string>
@@ -76,6 +78,26 @@ std::string texturedGltf() {
          R"({"transmissionFactor":0.5},"KHR_materials_emissive_strength":{"emissiveStrength":2}}}]})";
 }
 
+// A database with the tables of COLMAP that are read, two photos and a pair.
+std::string colmapDatabase() {
+  sqlite3* database = nullptr;
+  sqlite3_open(":memory:", &database);
+  sqlite3_exec(database,
+               "PRAGMA page_size=512; CREATE TABLE images(image_id INTEGER PRIMARY KEY, name TEXT, camera_id INTEGER);"
+               "CREATE TABLE keypoints(image_id INTEGER PRIMARY KEY, rows INTEGER);"
+               "CREATE TABLE matches(pair_id INTEGER PRIMARY KEY, rows INTEGER);"
+               "CREATE TABLE two_view_geometries(pair_id INTEGER PRIMARY KEY, rows INTEGER);"
+               "INSERT INTO images VALUES(1, 'p0', 1), (2, 'p1', 1); INSERT INTO keypoints VALUES(1, 900), (2, 0);"
+               "INSERT INTO two_view_geometries VALUES(2147483649, 77);",
+               nullptr, nullptr, nullptr);
+  sqlite3_int64 size = 0;
+  unsigned char* bytes = sqlite3_serialize(database, "main", &size, 0);
+  const std::string file(reinterpret_cast<const char*>(bytes), static_cast<size_t>(size));
+  sqlite3_free(bytes);
+  sqlite3_close(database);
+  return file;
+}
+
 // An EXIF block with a latitude, from which the fuzzer finds the other tags.
 std::string exif() {
   std::string out("Exif\0\0II*\0\x08\0\0\0\x01\0\x25\x88\x04\0\x01\0\0\0\x1a\0\0\0\0\0\0\0", 32);
@@ -150,6 +172,9 @@ int main(int count, char** arguments) {
             R"([{"camera_to_world":[1,0,0,1,0,1,0,2,0,0,1,3,0,0,0,1],"fov":50,"aspect":1.3}]})"));
   write("dataparser_transforms/a",
         std::string(R"({"transform":[[0,1,0,0.3],[1,0,0,-0.1],[0,0,-1,-0.08]],"scale":0.125})"));
+  write("colmap_database/a", colmapDatabase());
+  write("colmap_database/b",
+        std::string("Querying for image p0 [1/3] in 0.1s\n  image_id=2, image_name=p1, score=0.1\n"));
   write("world/a",
         std::string(
             R"({"kind":"tessera world","version":2,"scenes":[{"url":"a"},{"url":"b","position":[1,2,3],"scale":2}],)"

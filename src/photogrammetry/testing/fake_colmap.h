@@ -15,14 +15,18 @@
 namespace tessera {
 
 // A program in place of colmap, as a script that is run for each command but `help`; it finds the values of flags such
-// as --output_path as $output_path.
-inline fs::path writeColmap(const TemporaryFolder& folder, const std::string& script) {
+// as --output_path as $output_path. `mapsRest`: also for the mapper of photos that the first model lacks, which makes
+// no model otherwise.
+inline fs::path writeColmap(const TemporaryFolder& folder, const std::string& script, bool mapsRest = false) {
   const fs::path file = folder / "program";
-  writeFileAtomically(file,
-                      "#!/bin/sh\ncommand=$1; shift\n"
-                      "if [ $command = help ]; then echo 'COLMAP 3.8 -- Structure-from-Motion'; exit; fi\n"
-                      "while [ $# -gt 1 ]; do eval \"$(echo ${1#--} | tr . _)=\\$2\"; shift 2; done\n" +
-                          script + "\n");
+  writeFileAtomically(
+      file,
+      "#!/bin/sh\ncommand=$1; shift\n"
+      "if [ $command = help ]; then echo 'COLMAP 3.8 -- Structure-from-Motion'; exit; fi\n"
+      "while [ $# -gt 1 ]; do eval \"$(echo ${1#--} | tr . _)=\\$2\"; shift 2; done\n" +
+          std::string(
+              mapsRest ? "" : "if [ -n \"$image_list_path\" ]; then echo failed to create sparse model; exit 1; fi\n") +
+          script + "\n");
   fs::permissions(file, fs::perms::owner_all);
   return file;
 }
@@ -71,8 +75,9 @@ struct FakeLens {
   std::vector<double> parameters{640, 400, 300, 0, 0};
 };
 
-// Writes a binary model with these photos, a metre apart, one camera and one point.
-inline void writeModel(const fs::path& folder, const std::vector<int>& photos, const FakeLens& lens = {}) {
+// Writes a binary model with these photos, a metre apart, of one camera.
+inline void writeModel(const fs::path& folder, const std::vector<int>& photos, const FakeLens& lens = {},
+                       int points = 1000) {
   std::string bytes;
   const auto append = [&bytes](auto value) { bytes.append(reinterpret_cast<const char*>(&value), sizeof value); };
   append(uint64_t{1});
@@ -94,12 +99,14 @@ inline void writeModel(const fs::path& folder, const std::vector<int>& photos, c
   }
   writeFileAtomically(folder / "images.bin", bytes);
   bytes.clear();
-  append(uint64_t{1});
-  append(uint64_t{1});
-  for (const double x : {0.0, 0.0, 10.0}) append(x);
-  for (int channel = 0; channel < 3; ++channel) append(uint8_t{128});
-  append(0.5);
-  append(uint64_t{0});
+  append(static_cast<uint64_t>(points));
+  for (int point = 0; point < points; ++point) {
+    append(static_cast<uint64_t>(point + 1));
+    for (const double x : {0.01 * point, 0.0, 10.0}) append(x);
+    for (int channel = 0; channel < 3; ++channel) append(uint8_t{128});
+    append(0.5);
+    append(uint64_t{0});
+  }
   writeFileAtomically(folder / "points3D.bin", bytes);
 }
 
