@@ -17,6 +17,7 @@
 #include "photogrammetry/photo_matches.h"
 #include "photogrammetry/photo_models.h"
 #include "photogrammetry/photo_pairs.h"
+#include "pipeline/echoed_line.h"
 #include "pipeline/folder_lock.h"
 
 namespace tessera {
@@ -308,7 +309,7 @@ class PhotoRun {
                            capture.geo ? ", georeferenced" : "")};
   }
 
-  // Runs a verb of this program; its output is in logs/VERB.log, and the end of it on a terminal meanwhile.
+  // Runs a verb of this program; its messages are in logs/VERB.log, and the last one is shown meanwhile.
   StageOutcome runVerb(const std::string& verb, std::vector<std::string> arguments) {
     std::error_code status;
     fs::create_directories(out("logs"), status);
@@ -318,20 +319,26 @@ class PhotoRun {
     ChildProcess process;
     const std::string failure = process.start(arguments, {.log = log});
     if (!failure.empty()) throw Error(options_.program, "", "cannot be run: " + failure, "install it again");
+    const auto lastLine = [&process] {
+      const std::string words = process.lastWords();
+      return words.substr(words.rfind('\n') == words.npos ? 0 : words.rfind('\n') + 1);
+    };
+    EchoedLine echo;
     // It is interrupted in its own way: training writes a checkpoint.
     constexpr double kSecondsBetweenLooks = 0.2;
     for (bool asked = false; !process.waitFor(kSecondsBetweenLooks);) {
+      echo.show(lastLine());
       if (asked || !options_.interrupted()) continue;
       process.interrupt();
       asked = true;
     }
+    echo.clear();
     const std::string end = process.wait();
-    if (!end.empty()) stopIfInterrupted();
-    const std::string words = process.lastWords();
-    const std::string line = words.substr(words.rfind('\n') == words.npos ? 0 : words.rfind('\n') + 1);
-    if (!end.empty())
-      throw Error("tessera " + verb, "", end + ": " + line, "see " + log.string() + "; run again to go on");
-    return {process.peakBytes(), line};
+    if (!end.empty()) {
+      stopIfInterrupted();
+      throw Error("tessera " + verb, "", end + ": " + lastLine(), "see " + log.string() + "; run again to go on");
+    }
+    return {process.peakBytes(), lastLine()};
   }
 
   // A model that was trained on something else or in another way is kept beside the new one.
@@ -353,6 +360,7 @@ class PhotoRun {
     } else {
       arguments.insert(arguments.end(), {"--minutes", fmt::format("{}", options_.minutes)});
     }
+    inform("to watch the training: tail -f {}", (options_.out / "logs" / "train.log").string());
     return runVerb("train", arguments);
   }
 
