@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <map>
+#include <thread>
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "base/memory.h"
 #include "photogrammetry/colmap_database.h"
 #include "photogrammetry/look_alikes.h"
 
@@ -34,6 +36,16 @@ bool isTruncated(const fs::path& file) {
 }
 
 }  // namespace
+
+int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes) {
+  // COLMAP reduces photos to a longer side of 3200 pixels, and takes about 370 bytes for each pixel (measured).
+  constexpr int64_t kMaxPixels = 3200 * 3200, kBytesPerPixel = 370;
+  constexpr double kShare = 0.7;  // of the memory: the rest is for other programs
+  if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  const double each = static_cast<double>(kBytesPerPixel * std::clamp(pixels, int64_t{1}, kMaxPixels));
+  const double fitting = kShare * static_cast<double>(memoryBytes) / each;
+  return fitting >= threads ? threads : std::max(1, static_cast<int>(fitting));
+}
 
 PhotoMatches::PhotoMatches(fs::path folder, const PhotoList& list, ColmapSettings settings)
     : folder_(std::move(folder)), list_(list), settings_(std::move(settings)) {}
@@ -75,10 +87,13 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
   const auto done = [&] { return static_cast<int64_t>(ColmapDatabase(database()).features().size()); };
   const auto count = static_cast<int64_t>(list_.photos.size());
   if (done() < count) {
+    int64_t pixels = 0;
+    for (const CameraBody& body : list_.bodies) pixels = std::max(pixels, int64_t{body.width} * body.height);
+    const int threads = extractionThreads(settings_.threads, pixels, usableMemoryBytes());
     runColmap(
         "features",
         {"feature_extractor", "--database_path", database().string(), "--image_path", (folder_ / "images").string(),
-         "--SiftExtraction.use_gpu", "0", "--SiftExtraction.num_threads", settings_.threadsText()},
+         "--SiftExtraction.use_gpu", "0", "--SiftExtraction.num_threads", std::to_string(threads)},
         [&] { watch(done()); });
   }
   int64_t features = 0;

@@ -13,6 +13,10 @@
 
 namespace tessera {
 
+// Returns how many of `threads` (0: all of the machine's) can extract features of photos of so many pixels at once, in
+// so many bytes of memory: at least one.
+int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes);
+
 class PhotoMatches {
  public:
   // `folder` is created when it is written to. `list` must outlive this object.

@@ -78,6 +78,15 @@ TEST(ColmapDatabase, IsRefusedIfItIsSomethingElse) {
   EXPECT_EQ(readTextFile(folder / "text.db").substr(0, 14), "not a database");
 }
 
+TEST(PhotoMatches, TakeAsManyThreadsAsMemoryAllows) {
+  constexpr int64_t kGiB = int64_t{1} << 30;
+  EXPECT_EQ(extractionThreads(16, 800 * 600, 16 * kGiB), 16);
+  // 12 megapixels, reduced to 3200 pixels: 3.5 GiB for each.
+  EXPECT_EQ(extractionThreads(16, 4000 * 3000, 16 * kGiB), 3);
+  EXPECT_EQ(extractionThreads(16, 4000 * 3000, kGiB), 1);
+  EXPECT_GE(extractionThreads(0, 800 * 600, 16 * kGiB), 1);
+}
+
 TEST(PhotoMatches, SayWhyPhotosHaveNoPose) {
   const TemporaryFolder folder;
   makeDatabase(folder / "database.db");
