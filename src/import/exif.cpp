@@ -129,6 +129,12 @@ bool makesSense(const GpsFix& fix) {
 
 }  // namespace
 
+std::optional<double> exposureStops(const ExposureTags& exposure) {
+  if (!(exposure.seconds > 0) || !(exposure.iso > 0)) return std::nullopt;
+  const double aperture = exposure.aperture > 0 ? exposure.aperture : 1;
+  return std::log2(exposure.seconds * exposure.iso / (aperture * aperture));
+}
+
 PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
   PhotoTags tags;
   constexpr size_t kMax = size_t{1} << 28;
@@ -153,7 +159,13 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
   const size_t end = begin == text.npos ? text.npos : text.find("</x:xmpmeta>", begin);
   if (end != text.npos) {
     const XmpTags xmp = decodeXmp(text.substr(begin, end - begin));
-    if (!tags.gps && xmp.latitude && xmp.longitude) tags.gps = GpsFix{*xmp.latitude, *xmp.longitude, 0, 0};
+    // Receivers with corrections write more digits there than in EXIF.
+    if (xmp.latitude && xmp.longitude) {
+      GpsFix fix = tags.gps.value_or(GpsFix{});
+      fix.latitude = *xmp.latitude;
+      fix.longitude = *xmp.longitude;
+      if (makesSense(fix)) tags.gps = fix;
+    }
     if (tags.gps && xmp.absoluteAltitude) tags.gps->altitude = *xmp.absoluteAltitude;
     if (tags.gps && xmp.relativeAltitude && std::abs(*xmp.relativeAltitude) < 1e5) {
       tags.gps->relativeAltitude = *xmp.relativeAltitude;

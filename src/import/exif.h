@@ -27,7 +27,7 @@ struct CameraTags {
   double pixelsPerMillimetre = 0;  // of the sensor, along its width
   bool isThermal = false;          // an infrared camera beside the one for visible light, as the XMP says
 
-  bool isPanorama = false;         // the picture is a map of the sphere around the camera, as the XMP says
+  bool isPanorama = false;  // the picture is a map of the sphere around the camera, as the XMP says
 
   bool operator==(const CameraTags&) const = default;
 };
@@ -44,6 +44,10 @@ struct PhotoTags {
   std::optional<double> takenAt;  // seconds since 1970 by the camera's clock, whose time zone is unknown
   int orientation = 1;            // of EXIF, 1 to 8: how viewers turn the picture
 };
+
+// Returns the light that a picture collects in powers of two, up to a constant: log2(time · ISO / aperture²). An
+// unknown aperture is that of a lens without one. Nothing if time or ISO is unknown.
+std::optional<double> exposureStops(const ExposureTags& exposure);
 
 // Decodes the tags of a JPEG file from its untrusted bytes (all of them, or the first part). Missing and implausible
 // tags are empty.

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "base/testing/shared_data.h"
 #include "import/testing/test_support.h"
@@ -152,6 +153,32 @@ TEST(Exif, RejectsImplausibleFixes) {
       .entry(3, 2, 2, {'E', 0})
       .rationals(4, {1, 1, 0, 1, 0, 1});
   EXPECT_FALSE(decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, beyond.exif())).gps.has_value());
+}
+
+TEST(Exif, PrefersThePositionOfXmpUnlessItMakesNoSense) {
+  const auto read = [](const std::string& xmp) {
+    Bytes jpeg = encodeJpeg(gradientPicture(8, 8), 90, southWest().exif());
+    const std::string packet = "<x:xmpmeta " + xmp + "></x:xmpmeta>";
+    const auto* begin = reinterpret_cast<const std::byte*>(packet.data());
+    jpeg.insert(jpeg.end(), begin, begin + packet.size());
+    return decodePhotoTags(jpeg).gps;
+  };
+  const auto precise = read("a:GpsLatitude=\"50.12345678\" a:GpsLongitude=\"8.5\"");
+  ASSERT_TRUE(precise.has_value());
+  EXPECT_EQ(precise->latitude, 50.12345678);
+  EXPECT_EQ(precise->altitude, -12.5) << "that of EXIF, as there is no other";
+  for (const char* xmp : {"a:GpsLatitude=\"0\" a:GpsLongitude=\"0\"", "a:GpsLatitude=\"50.1\"",
+                          "a:GpsLatitude=\"99\" a:GpsLongitude=\"8\""}) {
+    ASSERT_TRUE(read(xmp).has_value());
+    EXPECT_NEAR(read(xmp)->latitude, -50.51, 1e-12) << xmp;
+  }
+}
+
+TEST(Exif, CountsExposureInStops) {
+  EXPECT_EQ(exposureStops({0.01, 200, 2}), std::log2(0.01 * 200 / 4));
+  EXPECT_EQ(exposureStops({0.01, 200, 0}), std::log2(0.01 * 200)) << "a lens without an aperture";
+  EXPECT_FALSE(exposureStops({0, 200, 2}).has_value());
+  EXPECT_FALSE(exposureStops({0.01, 0, 2}).has_value());
 }
 
 TEST(Exif, ReadsARealDrone) {

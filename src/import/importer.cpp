@@ -253,6 +253,23 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
   return outcomes;
 }
 
+// Sets the exposures of photos whose source does not know them, from EXIF. Nothing is set if most have no tags.
+void setExposures(Capture& capture, const std::vector<PhotoFacts>& facts) {
+  std::vector<std::optional<double>> stops;
+  double sum = 0;
+  int count = 0;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    if (capture.photos[i].exposure != 0) return;
+    stops.push_back(exposureStops(facts[i].tags.exposure));
+    if (!stops.back()) continue;
+    sum += *stops.back();
+    ++count;
+  }
+  if (2 * count < static_cast<int>(stops.size())) return;
+  for (size_t i = 0; i < stops.size(); ++i)
+    if (stops[i]) capture.photos[i].exposure = *stops[i] - sum / count;
+}
+
 void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
   std::vector<std::string> truncated, unreadable;
   std::vector<size_t> usable;
@@ -317,6 +334,7 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
   const Orientation orientation = orientWorld(source, gimbals);
   inform("{} photos, {} points; {}", capture.photos.size(), capture.points.size(), orientation.how);
 
+  setExposures(capture, facts);
   scaleCameras(capture, facts, options.downscale);
   fs::create_directories(out, status);
   dropFailed(source, importPictures(source, facts, out, options, orientation.scale, pool));

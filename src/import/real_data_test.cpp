@@ -60,6 +60,17 @@ TEST(RealData, BrightonBeachLooksDownFromAFlightAndItsPointsProjectBack) {
   EXPECT_LT(upperMedian(errors), 1.0);
   EXPECT_NEAR(upperMedian(stored), upperMedian(errors), 0.02);
 
+  // The exposures of EXIF, against their mean.
+  double sum = 0, least = 1e9, greatest = -1e9;
+  for (const Photo& photo : capture.photos) {
+    sum += photo.exposure;
+    least = std::min(least, photo.exposure);
+    greatest = std::max(greatest, photo.exposure);
+  }
+  EXPECT_NEAR(sum, 0, 1e-9);
+  EXPECT_GT(greatest - least, 0.1);
+  EXPECT_LT(greatest - least, 6);
+
   // A nadir flight at one height, in metres: the drone recorded 40 m above take-off.
   double lowest = 1e9, highest = -1e9, ground = 0;
   for (const Photo& photo : capture.photos) {

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
@@ -193,7 +193,7 @@ TEST(GltfModel, IsRefusedWithThePlaceOfTheError) {
 }
 
 TEST(GltfModel, TakesLittleTimeAndMemoryWhateverAFileClaims) {
-  const auto start = std::chrono::steady_clock::now();
+  const std::clock_t start = std::clock();  // of this process: other programs may keep it waiting
   json file = triangleFile();
   file["accessors"][0] = {{"componentType", 5126}, {"count", 4'000'000'000u}, {"type", "VEC3"}};
   EXPECT_NE(refusal(file).find("has more than 4000000 triangles"), std::string::npos);
@@ -236,7 +236,7 @@ TEST(GltfModel, TakesLittleTimeAndMemoryWhateverAFileClaims) {
     return Bytes(bytes.begin(), bytes.end());
   };
   EXPECT_THROW(readModel("a.gltf", reader), Error);
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+  EXPECT_LT((std::clock() - start) / CLOCKS_PER_SEC, 20);
 }
 
 TEST(GltfModel, OfGlbIsReadWholeOrRefused) {
