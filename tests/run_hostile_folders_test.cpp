@@ -250,7 +250,7 @@ TEST_P(HostileFolders, EndWithWhatIsWrong) {
   EXPECT_EQ(said.exitCode, hostile.exitCode) << said.out << said.err;
   for (const std::string& line : hostile.lines)
     EXPECT_TRUE(contains(said.out + said.err, line)) << line << "\n" << said.out << said.err;
-  EXPECT_FALSE(fs::exists(folder / "pwned"));
+  EXPECT_FALSE(fs::exists(fs::current_path() / "pwned"));
 }
 
 INSTANTIATE_TEST_SUITE_P(Run, HostileFolders, testing::ValuesIn(kFolders),

@@ -44,6 +44,8 @@ std::string ChildProcess::start(std::vector<std::string> arguments, const ChildO
     messages_.reset(::open(options.log.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
   }
   if (messages_.get() < 0) return std::strerror(errno);
+  before_ = std::max<off_t>(::lseek(messages_.get(), 0, SEEK_END), 0);
+  hasOwnGroup_ = options.hasOwnGroup;
   Descriptor nothing;
   if (options.input < 0) nothing.reset(::open("/dev/null", O_RDONLY | O_CLOEXEC));
   const int input = options.input < 0 ? nothing.get() : options.input;
@@ -59,7 +61,7 @@ std::string ChildProcess::start(std::vector<std::string> arguments, const ChildO
   if (process == 0) {
     // Other threads do not exist here and may have held any lock: only system calls.
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-    ::setpgid(0, 0);
+    if (options.hasOwnGroup) ::setpgid(0, 0);
     if (::getppid() == parent && ::dup2(input, STDIN_FILENO) >= 0 && ::dup2(messages_.get(), STDOUT_FILENO) >= 0 &&
         ::dup2(messages_.get(), STDERR_FILENO) >= 0) {
       ::execvp(pointers[0], pointers.data());
@@ -115,18 +117,18 @@ std::string ChildProcess::wait() {
 }
 
 void ChildProcess::interrupt() {
-  if (isRunning() && !ended_) ::kill(process_, SIGINT);
+  if (isRunning() && !ended_) ::kill(hasOwnGroup_ ? -process_ : process_, SIGINT);
 }
 
 void ChildProcess::kill() {
   if (!isRunning()) return;
-  if (!ended_) ::kill(process_, SIGKILL);
+  if (!ended_) ::kill(hasOwnGroup_ ? -process_ : process_, SIGKILL);
   wait();
 }
 
 std::string ChildProcess::lastWords(size_t bytes) const {
   const off_t size = ::lseek(messages_.get(), 0, SEEK_END);
-  std::string words(std::min(bytes, static_cast<size_t>(std::max<off_t>(size, 0))), '\0');
+  std::string words(std::min(bytes, static_cast<size_t>(std::max<off_t>(size - before_, 0))), '\0');
   const ssize_t count = ::pread(messages_.get(), words.data(), words.size(), size - static_cast<off_t>(words.size()));
   words.resize(count > 0 ? static_cast<size_t>(count) : 0);
   while (!words.empty() && std::isspace(static_cast<unsigned char>(words.back()))) words.pop_back();

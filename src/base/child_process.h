@@ -1,6 +1,5 @@
 // A program that runs beside this one, never through a shell: its arguments are passed as they are. It is killed when
-// the thread that started it ends, whatever ends it: no program is left behind. It has a process group of its own, so
-// that Ctrl-C on a terminal reaches it only through `interrupt`.
+// the thread that started it ends, whatever ends it: no program is left behind.
 #pragma once
 
 #include <sys/types.h>
@@ -33,6 +32,7 @@ class Descriptor {
 struct ChildOptions {
   int input = -1;  // a descriptor that it reads as its standard input; -1: it has none
   fs::path log;    // a file to which its standard output and error output are appended; empty: they are kept in memory
+  bool hasOwnGroup = false;  // Ctrl-C on a terminal does not reach it; `interrupt` does
 };
 
 class ChildProcess {
@@ -51,7 +51,7 @@ class ChildProcess {
   std::string wait();
   void interrupt();  // sends SIGINT
   void kill();
-  // The end of what it wrote to its standard output and error output.
+  // The end of what this run of it wrote to its standard output and error output.
   std::string lastWords(size_t bytes = 400) const;
   // The largest resident size in bytes of the program, or of one that it ran itself; 0 before it has ended.
   int64_t peakBytes() const { return peakBytes_; }
@@ -61,6 +61,8 @@ class ChildProcess {
   bool ended_ = false;
   int status_ = 0;
   int64_t peakBytes_ = 0;
+  bool hasOwnGroup_ = false;
+  int64_t before_ = 0;   // bytes of the log that others wrote
   Descriptor messages_;  // a memory file, or the log
 };
 

@@ -93,8 +93,8 @@ std::vector<std::optional<double>> heightsAbove(const Fixes& fixes, const Fit& f
 
 // What a step of Gauss and Newton has found.
 struct Step {
-  Vec3d middle = Vec3d::Zero();  // of the fixes, about which rotation and scale turn
-  Eigen::MatrixXd covariance;    // of rotation (3), scale, translation (3) and heights, for the given deviations
+  // Of rotation (3) and scale about the middle of the fixes, translation (3) and heights, for the given deviations.
+  Eigen::MatrixXd covariance;
 };
 
 // A step of Gauss and Newton on the similarity and the heights of the flights `corrected` together: in turns, they
@@ -131,7 +131,6 @@ Step improve(const Fixes& fixes, const std::vector<size_t>& corrected, const Vec
   moved.topRightCorner<3, 1>() = middle + change.segment<3>(4) - moved.topLeftCorner<3, 3>() * middle;
   fit.enuFromWorld = moved * fit.enuFromWorld;
   for (size_t f = 0; f < corrected.size(); ++f) fit.tooHigh[corrected[f]] = change[static_cast<Eigen::Index>(7 + f)];
-  step.middle = middle;
   step.covariance = solver.pseudoInverse();
   return step;
 }
@@ -177,9 +176,13 @@ void raise(Fixes& fixes, Fit& fit, double metres) {
   fit.enuFromWorld(2, 3) += metres;
 }
 
-// Returns the height of absolute altitudes above the fit, the median of photos of flights that were not corrected.
-// Flights that took off elsewhere have other heights above take-off, whose mean says little.
-double medianRise(const GeoFrame& frame, const std::vector<const Photo*>& photos, const Fixes& fixes, const Fit& fit) {
+struct Rise {
+  double metres = 0, error = 0;
+};
+
+// Returns the height of absolute altitudes above the fit with its standard error, the median of photos of flights that
+// were not corrected. Flights that took off elsewhere have other heights above take-off, whose mean says little.
+Rise medianRise(const GeoFrame& frame, const std::vector<const Photo*>& photos, const Fixes& fixes, const Fit& fit) {
   const Points mapped = (fit.enuFromWorld * fixes.world.colwise().homogeneous()).topRows<3>();
   std::vector<double> rises;
   for (size_t i = 0; i < photos.size(); ++i) {
@@ -188,7 +191,13 @@ double medianRise(const GeoFrame& frame, const std::vector<const Photo*>& photos
     rises.push_back(enuFromGps(frame, gps.latitude, gps.longitude, gps.altitude).z() -
                     mapped(2, static_cast<Eigen::Index>(i)));
   }
-  return rises.empty() ? 0 : upperMedian(rises);
+  if (rises.empty()) return {};
+  constexpr double kMedian = 0.6745, kOfMedian = 1.2533;  // of a normal variable; of the error of the mean
+  Rise rise{upperMedian(rises), 0};
+  const auto n = static_cast<double>(rises.size());
+  for (double& height : rises) height = std::abs(height - rise.metres);
+  rise.error = kOfMedian * upperMedian(rises) / kMedian / std::sqrt(n);
+  return rise;
 }
 
 // Returns what fixes differ from the fit by, for all of them.
@@ -351,8 +360,10 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
   }
   if (best.inliers.size() >= 3) {
     correctFlights(fixes, best);
-    if (allRelative) raise(fixes, best, medianRise(result.frame, fixed, fixes, best));
+    const Rise rise = allRelative ? medianRise(result.frame, fixed, fixes, best) : Rise{};
+    raise(fixes, best, rise.metres);
     finish(fixes, best, result);
+    result.middleError = std::hypot(result.middleError, rise.error);
     for (Georeference::Residual& residual : result.residuals)
       residual.photo = static_cast<int>(fixed[static_cast<size_t>(residual.photo)] - photos.data());
   }

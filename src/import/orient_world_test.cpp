@@ -190,7 +190,8 @@ TEST(Orient, KeepsTheAltitudesOfTheLargerOfTwoFlights) {
 // Surveys of 7 × 8 photos at two heights, with normally distributed errors of GPS of 2 m, and 0.5 m in height.
 class NoisySurvey {
  public:
-  explicit NoisySurvey(uint64_t seed) : random_(seed, 5) {
+  // `hasBarometer`: heights above take-off are right within 0.5 m, absolute ones only within 3 m.
+  explicit NoisySurvey(uint64_t seed, bool hasBarometer = false) : random_(seed, 5) {
     const GeographicLib::LocalCartesian local(50, 8, 100);
     for (int i = 0; i < 56; ++i) {
       Photo photo;
@@ -199,6 +200,10 @@ class NoisySurvey {
       GpsFix fix;
       const double x = at.x() + 2 * normal(), y = at.y() + 2 * normal(), z = at.z() + 0.5 * normal();
       local.Reverse(x, y, z, fix.latitude, fix.longitude, fix.altitude);
+      if (hasBarometer) {
+        fix.relativeAltitude = z - 20;
+        fix.altitude += at.z() - z + 3 * normal();
+      }
       photo.gps = fix;
       source.capture.photos.push_back(photo);
     }
@@ -231,12 +236,14 @@ class NoisySurvey {
   uint64_t draw_ = 0;
 };
 
-TEST(Georeference, PredictsItsErrors) {
-  constexpr int kTrials = 60;
+class ErrorsOfGeoreferences : public testing::TestWithParam<bool> {};
+
+TEST_P(ErrorsOfGeoreferences, ArePredicted) {
+  constexpr int kTrials = 100;
   double scale = 0, rotation = 0, middle = 0, predictedScale = 0, predictedRotation = 0, predictedMiddle = 0;
   double horizontal = 0, vertical = 0;
   for (int trial = 0; trial < kTrials; ++trial) {
-    NoisySurvey survey(static_cast<uint64_t>(trial) + 1);
+    NoisySurvey survey(static_cast<uint64_t>(trial) + 1, GetParam());
     const Mat3d trueRotation = survey.source.capture.photos[0].worldFromCamera.rotation;
     const Georeference fit = survey.fit();
     EXPECT_EQ(fit.residuals.size(), 56u);
@@ -266,6 +273,9 @@ TEST(Georeference, PredictsItsErrors) {
   EXPECT_NEAR(std::sqrt(rotation / predictedRotation), 1, 0.25);
   EXPECT_NEAR(std::sqrt(middle / predictedMiddle), 1, 0.25);
 }
+
+INSTANTIATE_TEST_SUITE_P(Georeference, ErrorsOfGeoreferences, testing::Bool(),
+                         [](const auto& test) { return test.param ? "WithABarometer" : "ByGpsAlone"; });
 
 TEST(Georeference, SaysIfPosesBend) {
   for (uint64_t seed = 1; seed <= 40; ++seed) EXPECT_FALSE(NoisySurvey(seed).fit().isBent()) << seed;

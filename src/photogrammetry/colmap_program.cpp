@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <csignal>
 
 #include "base/child_process.h"
 #include "base/error.h"
@@ -37,7 +38,7 @@ void ColmapProgram::run(std::vector<std::string> arguments, const std::function<
   const std::string command = arguments.at(0);
   arguments.insert(arguments.begin(), program_);
   ChildProcess process;
-  const std::string failure = process.start(std::move(arguments), {.log = log_});
+  const std::string failure = process.start(std::move(arguments), {.log = log_, .hasOwnGroup = true});
   if (!failure.empty()) throw Error(program_, "", "cannot be run: " + failure, "install it again");
   while (!process.waitFor(kSecondsBetweenLooks)) {
     if (watch) watch();
@@ -45,10 +46,13 @@ void ColmapProgram::run(std::vector<std::string> arguments, const std::function<
   const std::string end = process.wait();
   peakBytes_ = std::max(peakBytes_, process.peakBytes());
   if (end.empty()) return;
-  const bool killed = end.find("signal 9") != end.npos;
-  throw Error(program_ + " " + command, "", end + (killed ? "" : ": " + process.lastWords(200)),
-              killed ? "if memory ran out, close other programs or use fewer threads; run again to go on"
-                     : "see " + log_.string() + "; run again to go on");
+  for (const int signal : {SIGKILL, SIGTERM, SIGINT, SIGHUP}) {
+    if (end != fmt::format("was ended by signal {}", signal)) continue;
+    throw ColmapKilled(program_ + " " + command, "", end,
+                       "if memory ran out, close other programs or use fewer threads; run again to go on");
+  }
+  throw Error(program_ + " " + command, "", end + ": " + process.lastWords(200),
+              "see " + log_.string() + "; run again to go on");
 }
 
 }  // namespace tessera

@@ -173,6 +173,8 @@ std::vector<LeftOutPhoto> PhotoMatches::explain(const std::vector<int>& photos, 
     ++links[pair.first];
     ++links[pair.second];
   }
+  constexpr int kMaxDecoded = 50;  // takes time
+  int decoded = 0;
   std::vector<LeftOutPhoto> explained;
   for (const int i : photos) {
     const auto count = features.find(i);
@@ -182,7 +184,7 @@ std::vector<LeftOutPhoto> PhotoMatches::explain(const std::vector<int>& photos, 
       reason = "of another place: they match each other, but not the rest";
     } else if (count == features.end()) {
       reason = "not decodable";
-    } else if (isTruncated(file)) {
+    } else if (decoded++ < kMaxDecoded && isTruncated(file)) {
       reason = "truncated";
     } else if (count->second < kFewFeatures) {
       reason = "few features, as of water, sky or a blurred picture";

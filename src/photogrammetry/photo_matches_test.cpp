@@ -31,6 +31,18 @@ TEST(ColmapProgram, FailsWithTheLastWordsOfTheProgram) {
   EXPECT_EQ(readTextFile(folder / "log"), "no matches\n");
 }
 
+TEST(ColmapProgram, TellsThatItWasKilledFromThatItFailed) {
+  const TemporaryFolder folder;
+  const auto run = [&](const std::string& script) {
+    ColmapProgram(folder / "log", writeColmap(folder, script)).run({"x"});
+  };
+  EXPECT_THROW(run("kill -9 $$"), ColmapKilled);
+  EXPECT_THROW(run("kill -15 $$"), ColmapKilled);
+  const std::string message = errorMessage([&] { run("echo Check failed; kill -6 $$"); });
+  EXPECT_NE(message.find("was ended by signal 6: Check failed"), std::string::npos) << message;
+  EXPECT_EQ(errorMessage([&] { run("exit 3"); }).find("Check failed"), std::string::npos) << "words of the run before";
+}
+
 TEST(ColmapDatabase, HoldsCamerasAndPhotosOnce) {
   const TemporaryFolder folder;
   makeDatabase(folder / "database.db");

@@ -18,7 +18,7 @@ namespace tessera {
 namespace {
 
 constexpr int kPhotosPerSnapshot = 25;
-constexpr size_t kKeptSnapshots = 2;        // the last may be of a time when the mapper went wrong
+constexpr size_t kKeptSnapshots = 2;        // the largest may be incomplete on the disk
 constexpr size_t kLeastShared = 3;          // photos that model_merger needs
 constexpr size_t kPhotosForFullLens = 40;   // of a camera, from which on its principal point is adjusted
 constexpr double kFarthestCentre = 0.05;    // of the size of the picture, of a principal point from the middle
@@ -291,6 +291,8 @@ void PhotoModels::mapRest(const fs::path& models, const Watch& watch) {
                "--Mapper.num_threads", settings_.threadsText(), "--Mapper.min_model_size", "3",
                "--Mapper.init_min_tri_angle", "4", "--Mapper.init_min_num_inliers", "50"},
               [&] { watch(static_cast<int64_t>(placed.size()) + lastRegistered(log)); });
+  } catch (const ColmapKilled&) {
+    throw;
   } catch (const Error& error) {
     if (readEnd(log).find(kNoModel) == std::string::npos) warn("no further models: {}", error.what());
   }
@@ -302,9 +304,16 @@ void PhotoModels::mapRest(const fs::path& models, const Watch& watch) {
   fs::remove_all(rest, status);
 }
 
+void PhotoModels::discardMapped() const {
+  for (const char* name : {"snapshots", "snapshot.begun", "sparse.partial", "rest.partial"})
+    removeFolder(folder_ / name);
+}
+
 void PhotoModels::discardJoined() const {
   discardAdjusted();
-  for (const char* name : {"joined", "joined.partial", "snapshots", "snapshot.begun"}) removeFolder(folder_ / name);
+  for (const char* name : {"joined", "joined.before", "joined.partial", "joined.attempt", "joined.points",
+                           "joined.adjusted", "extended.partial", "snapshots", "snapshot.begun"})
+    removeFolder(folder_ / name);
 }
 
 void PhotoModels::discardAdjusted() const {
@@ -341,23 +350,33 @@ int PhotoModels::join(const Watch& watch) {
   std::error_code status;
   fs::remove_all(result, status);
   Piece whole = pieces[0];
+  std::vector<Piece> left(pieces.begin() + 1, pieces.end());
   int count = 0;
-  for (size_t i = 1; i < pieces.size(); ++i) {
-    size_t shared = 0;
-    for (const int photo : pieces[i].photos) shared += whole.photos.contains(photo) ? 1 : 0;
-    if (shared < kLeastShared) continue;
-    fs::remove_all(attempt, status);
-    makeFolder(attempt);
-    runColmap("joining",
-              {"model_merger", "--input_path1", whole.folder.string(), "--input_path2", pieces[i].folder.string(),
-               "--output_path", attempt.string()},
-              [&] { watch(0); });
-    // If it fails, it reports success and writes the first model.
-    const std::set<int> photos = photosIn(attempt);
-    if (photos.size() <= whole.photos.size() || !agreesWithGps(attempt, whole.folder)) continue;
-    replaceFolder(attempt, result);
-    whole = {result, photos};
-    ++count;
+  // What one model shares no photos with, it may once it has been joined with another.
+  for (bool joinsMore = true; joinsMore;) {
+    joinsMore = false;
+    for (auto piece = left.begin(); piece != left.end();) {
+      size_t shared = 0;
+      for (const int photo : piece->photos) shared += whole.photos.contains(photo) ? 1 : 0;
+      if (shared < kLeastShared) {
+        ++piece;
+        continue;
+      }
+      fs::remove_all(attempt, status);
+      makeFolder(attempt);
+      runColmap("joining",
+                {"model_merger", "--input_path1", whole.folder.string(), "--input_path2", piece->folder.string(),
+                 "--output_path", attempt.string()},
+                [&] { watch(0); });
+      piece = left.erase(piece);
+      // If it fails, it reports success and writes the first model.
+      const std::set<int> photos = photosIn(attempt);
+      if (photos.size() <= whole.photos.size() || !agreesWithGps(attempt, whole.folder)) continue;
+      replaceFolder(attempt, result);
+      whole = {result, photos};
+      joinsMore = true;
+      ++count;
+    }
   }
   fs::remove_all(attempt, status);
   if (count == 0) return 0;

@@ -29,14 +29,17 @@ class PhotoModels {
   // results.
   void map(bool resumes, const Watch& watch);
 
+  void discardMapped() const;  // what an interrupted `map` would go on with
+
   // Joins models that share photos with the largest. Returns how many it has joined.
   int join(const Watch& watch);
   // Adds photos that further matches have connected with the largest model. `resumes` as for `map`.
   void extend(bool resumes, const Watch& watch);
   void discardJoined() const;
 
-  // Adjusts poses, points and lenses together. Cameras of many photos get a lens with decentring and a free principal
-  // point, which the mapper keeps in the middle: it would be too weakly determined while there are few photos.
+  // Adjusts poses, points and lenses together. Cameras of many photos get a lens with decentring; if all cameras have
+  // many, also a free principal point, which the mapper keeps in the middle: it would be too weakly determined while
+  // there are few photos.
   void adjust(const Watch& watch);
   void discardAdjusted() const;
 

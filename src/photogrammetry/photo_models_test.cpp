@@ -144,7 +144,7 @@ TEST_F(PhotoModelsTest, AreNotJoinedIfTheyShareTooFewPhotos) {
 }
 
 TEST_F(PhotoModelsTest, AreNotJoinedAgainstGps) {
-  // Photos of `a` stand on a square of 60 m, as their fixes say; those of the joined model do not.
+  // Photos of `a` stand on a strip of 14 m × 211 m, as their fixes say; those of the joined model do not.
   for (int i = 0; i < 30; ++i) {
     GpsFix gps;
     gps.latitude = 50 + 1e-4 * i;

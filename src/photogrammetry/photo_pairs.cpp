@@ -145,7 +145,7 @@ PhotoPair inOrder(int a, int b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
-void pairInSequence(const PhotoList& list, int neighbours, std::set<PhotoPair>& pairs) {
+void pairInSequence(const PhotoList& list, const PairOptions& options, std::set<PhotoPair>& pairs) {
   std::map<int, std::vector<int>> flights;
   for (size_t i = 0; i < list.photos.size(); ++i) flights[list.photos[i].flight].push_back(static_cast<int>(i));
   for (auto& [flight, photos] : flights) {
@@ -154,8 +154,13 @@ void pairInSequence(const PhotoList& list, int neighbours, std::set<PhotoPair>& 
              list.photos[static_cast<size_t>(b)].tags.takenAt.value_or(0);
     });
     for (size_t i = 0; i < photos.size(); ++i) {
-      for (size_t k = i + 1; k < photos.size() && k <= i + static_cast<size_t>(neighbours); ++k)
-        pairs.insert(inOrder(photos[i], photos[k]));
+      for (size_t k = i + 1; k < photos.size(); ++k) {
+        const bool haveGps = list.photos[static_cast<size_t>(photos[i])].tags.gps.has_value() &&
+                             list.photos[static_cast<size_t>(photos[k])].tags.gps.has_value();
+        const auto distance = static_cast<int>(k - i);
+        if (distance > std::max(options.neighbours, options.sequence)) break;
+        if (distance <= (haveGps ? options.neighbours : options.sequence)) pairs.insert(inOrder(photos[i], photos[k]));
+      }
     }
   }
 }
@@ -222,9 +227,10 @@ void pairLookAlikes(const PhotoList& list, const LookAlikes& lookAlikes, int par
     for (const int other : lookAlikes[i]) {
       const auto o = static_cast<size_t>(other);
       if (count == partners) break;
-      if (other == static_cast<int>(i)) continue;
+      // Their places tell more of photos that both have GPS.
+      if (other == static_cast<int>(i) || (list.photos[i].tags.gps && list.photos[o].tags.gps)) continue;
       ++count;
-      if (!list.photos[i].tags.gps || !list.photos[o].tags.gps) pairs.insert(inOrder(static_cast<int>(i), other));
+      pairs.insert(inOrder(static_cast<int>(i), other));
     }
   }
 }
@@ -244,11 +250,8 @@ std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& look
       for (int b = a + 1; b < count; ++b) pairs.emplace(a, b);
     return {pairs.begin(), pairs.end()};
   }
-  const auto fixes = std::count_if(list.photos.begin(), list.photos.end(),
-                                   [](const ListedPhoto& photo) { return photo.tags.gps.has_value(); });
-  const bool hasGps = 2 * fixes >= count;
-  pairInSequence(list, hasGps ? options.neighbours : options.sequence, pairs);
-  if (hasGps) pairByFootprint(list, options, pairs);
+  pairInSequence(list, options, pairs);
+  pairByFootprint(list, options, pairs);
   pairLookAlikes(list, lookAlikes, options.lookAlikes, pairs);
   return {pairs.begin(), pairs.end()};
 }

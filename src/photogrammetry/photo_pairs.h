@@ -18,7 +18,7 @@ struct PairOptions {
   int partners = 15;        // with how many others a photo is paired by overlap
   int otherFlight = 4;      // with how many photos of each other flight that overlaps, at least
   int neighbours = 2;       // in the sequence of a flight, to each side
-  int sequence = 10;        // neighbours to each side if there is no GPS
+  int sequence = 10;        // the same, of photos without GPS
   int lookAlikes = 20;      // with how many photos that look alike a photo without GPS is paired
   double minOverlap = 0.2;  // share of a photo's pixels
   double maxAngle = 50;     // degrees between the optical axes

@@ -142,6 +142,25 @@ TEST(PhotoPairs, FollowFromDistancesIfHeightsAreUnknown) {
   }
 }
 
+// Drone photos with GPS among more photos without.
+TEST(PhotoPairs, FollowFromGpsForThosePhotosThatHaveIt) {
+  PhotoList list = survey(8, 12, 15);
+  const int drone = static_cast<int>(list.photos.size());
+  for (int i = 0; i < 150; ++i) {
+    ListedPhoto photo;
+    photo.flight = 1;
+    list.photos.push_back(photo);
+  }
+  list.flights = 2;
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
+  const auto has = [&](int a, int b) { return std::binary_search(pairs.begin(), pairs.end(), PhotoPair(a, b)); };
+  // Photo 25 is the second of the third line; 46 stands beside it, at the other end of the fourth.
+  EXPECT_TRUE(has(25, 46));
+  EXPECT_FALSE(has(25, 35)) << "ten apart in the sequence of photos with GPS";
+  EXPECT_TRUE(has(drone, drone + 10)) << "ten apart in that of photos without";
+  EXPECT_FALSE(has(drone, drone + 11));
+}
+
 TEST(LookAlikes, AreThoseThatTheProgramPrints) {
   const PhotoList list = survey(1, 4, 15);
   PhotoList named = list;

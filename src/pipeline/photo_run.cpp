@@ -121,6 +121,7 @@ class PhotoRun {
         {.name = "mapping",
          .settings = "",
          .isComplete = has("poses/sparse"),
+         .discard = [this] { models_->discardMapped(); },
          .run = [this](bool resumes) { return mapping(resumes); }},
         {.name = "remapping",
          .settings = "",
@@ -212,6 +213,9 @@ class PhotoRun {
       try {
         inform("some photos have no GPS: photos that look alike are searched for");
         lookAlikes = matches_->findLookAlikes([this](int64_t) { stopIfInterrupted(); });
+      } catch (const ColmapKilled&) {
+        stopIfInterrupted();
+        throw;
       } catch (const Error& error) {
         warn("photos without GPS are only compared with those before and after them: {}", error.what());
       }
@@ -244,11 +248,24 @@ class PhotoRun {
     return {models_->takePeakBytes(), summary};
   }
 
+  int join() {
+    try {
+      return models_->join([this](int64_t) { stopIfInterrupted(); });
+    } catch (const ColmapKilled&) {
+      stopIfInterrupted();
+      throw;
+    } catch (const Error& error) {
+      warn("models that share photos are not joined: {}", error.what());
+      return 0;
+    }
+  }
+
   // A second round for what the first has left.
   StageOutcome remapping(bool resumes) {
-    const int joined = resumes && has("poses/joined")() ? 0 : models_->join([this](int64_t) { stopIfInterrupted(); });
+    const bool wasJoined = resumes && has("poses/joined")();
+    const int joined = wasJoined ? 0 : join();
     const std::vector<int> missing = models_->unplaced();
-    if (missing.empty() && joined == 0) return {0, "not needed"};
+    if (missing.empty() && joined == 0 && !wasJoined) return {0, "not needed"};
     if (!missing.empty()) {
       inform("{} photos could not be placed; they are compared with more of the others", missing.size());
       try {
@@ -256,11 +273,15 @@ class PhotoRun {
         const LookAlikes lookAlikes = readPairs(pairsFile(), list_.photos.size()).lookAlikes;
         matches_->match(chooseMorePairs(list_, lookAlikes, missing), [this](int64_t) { stopIfInterrupted(); });
         models_->extend(resumes, watch(progress));
+      } catch (const ColmapKilled&) {
+        stopIfInterrupted();
+        throw;
       } catch (const Error& error) {
         warn("no photos could be added: {}", error.what());
       }
     }
     std::string summary = placedText(models_->unplaced().size());
+    if (wasJoined) summary += ", models joined before";
     if (joined > 0) summary += fmt::format(", {} models joined with the largest", joined);
     return {std::max(matches_->takePeakBytes(), models_->takePeakBytes()), summary};
   }
@@ -317,7 +338,7 @@ class PhotoRun {
     arguments.insert(arguments.begin(), {options_.program, verb});
     if (options_.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(options_.threads)});
     ChildProcess process;
-    const std::string failure = process.start(arguments, {.log = log});
+    const std::string failure = process.start(arguments, {.log = log, .hasOwnGroup = true});
     if (!failure.empty()) throw Error(options_.program, "", "cannot be run: " + failure, "install it again");
     const auto lastLine = [&process] {
       const std::string words = process.lastWords();
@@ -405,7 +426,9 @@ void runFromPhotos(const PhotoRunOptions& options) {
   const FolderLock lock(options.out);
   PhotoRun run(options);
   runStages(options.out, fmt::format("run {} {}", options.photos.string(), options.out.string()), run.stages(),
-            options.range);
+            options.range, [&] {
+              if (options.interrupted()) throw RunInterrupted();
+            });
 }
 
 }  // namespace tessera

@@ -88,13 +88,16 @@ std::string textDigest(const std::string& text) {
 }
 
 void runStages(const fs::path& folder, const std::string& request, const std::vector<Stage>& stages,
-               const StageRange& range) {
+               const StageRange& range, const std::function<void()>& check) {
   requireStage(stages, range.from, "--from");
   requireStage(stages, range.until, "--until");
   const fs::path file = folder / "run.json";
   std::string begunFrom;  // what an interrupted call was asked to run again from
   const auto before = readRecords(file, begunFrom);
-  const std::string from = range.from == begunFrom ? "" : range.from;
+  const bool wasInterrupted =
+      before.size() < stages.size() ||
+      std::any_of(before.begin(), before.end(), [](const auto& entry) { return !entry.second.isFinished; });
+  const std::string from = wasInterrupted && range.from == begunFrom ? "" : range.from;
   Json run = {{"version", 1}, {"request", request}, {"stages", Json::array()}};
   if (!range.from.empty()) run["begun_from"] = range.from;
   std::string digest;
@@ -110,6 +113,7 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
       result = known->second;
       fmt::print("{:<10} finished before: {}\n", stage.name, result.summary);
     } else {
+      check();
       // Results of later stages end with those of this one, also if it is interrupted.
       again = true;
       // What it left is discarded before the record says that the stage may be resumed.

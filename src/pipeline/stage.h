@@ -35,9 +35,11 @@ struct StageRange {
 };
 
 // Runs the stages in order, and prints a line for each on stdout. `request` describes the run in run.json. Throws Error
-// if a stage of `range` does not exist, and what a stage throws.
-void runStages(const fs::path& folder, const std::string& request, const std::vector<Stage>& stages,
-               const StageRange& range);
+// if a stage of `range` does not exist, and what a stage or `check` throws, which is called before each stage that
+// runs.
+void runStages(
+    const fs::path& folder, const std::string& request, const std::vector<Stage>& stages, const StageRange& range,
+    const std::function<void()>& check = [] {});
 
 // Returns a digest of a text, 16 hexadecimal digits.
 std::string textDigest(const std::string& text);

@@ -122,6 +122,22 @@ TEST_F(Stages, GoOnWithWhatWasBegunAgainByTheSameCall) {
   EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "two three ") << "nothing was interrupted";
 }
 
+TEST_F(Stages, AreNotBegunIfTheCheckThrows) {
+  std::string ran;
+  const auto stage = [&](const char* name) {
+    return Stage{.name = name, .run = [&ran, name](bool) {
+                   ran += name;
+                   return StageOutcome{};
+                 }};
+  };
+  EXPECT_THROW(runStages(folder_.path(), "test", {stage("a"), stage("b")}, {},
+                         [&] {
+                           if (ran == "a") throw Error("b", "", "is interrupted", "");
+                         }),
+               Error);
+  EXPECT_EQ(ran, "a");
+}
+
 TEST_F(Stages, ForgetWhatFollowsAStageThatIsInterrupted) {
   run({"", "", ""});
   failing_ = "two";
