@@ -39,7 +39,13 @@ Json toJson(const Georeference& fit, const std::vector<Photo>& photos) {
                          {"predicted", metres(residual.predicted)},
                          {"agrees", residual.isInlier}});
   }
+  Json matrix = Json::array();
+  for (int row = 0; row < 4; ++row)
+    for (int column = 0; column < 4; ++column) matrix.push_back(fit.frame.enuFromWorld(row, column));
   Json json = {
+      {"origin",
+       {{"latitude", fit.frame.latitude}, {"longitude", fit.frame.longitude}, {"altitude", fit.frame.altitude}}},
+      {"enu_from_model", std::move(matrix)},
       {"fixes", fit.fixes},
       {"agreeing", fit.inliers},
       {"rms_metres", fit.rmsMetres},
