@@ -5,9 +5,11 @@
 #   survey    a survey of a city of 2x2 blocks in 202 photographs of 800x600, GPS errors of 2 m and 0.5 m, one flight 15 m too high:
 #             at least 98 % get poses; after the best similarity to the true ones 0.1 m, 0.05 degrees (medians, without a pose:
 #             infinite) and 0.5 m (worst); scale, rotation and middle from GPS within twice the predicted standard errors
-#   untagged  the same photographs without EXIF and XMP: at least 95 % get poses, none more than 1 m off
+#   exposure  brighton_beach at 400x225, ten minutes of `field`: exposures predicted from EXIF at least 0.4 dB above neutral, and on the
+#             right halves of the views at most 0.2 dB below fitted ones
+#   untagged  the same photographs as in survey, without EXIF and XMP: at least 95 % get poses, none more than 1 m off
 # Resumable: everything is kept in build/bench/photos, and what exists is not made again.
-#   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox survey untagged"] bench/photos.sh
+#   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox exposure survey untagged"] [SEEDS="1 2 3"] [MINUTES=10] bench/photos.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
@@ -32,6 +34,30 @@ brighton() {
 fox() {
   posed fox "$data/fox/images"
   verdict "fox, photos with poses of 50" "$(registered fox)" '>=' 49
+}
+
+# exposed MODEL HOW FILE ARGUMENTS...: prints the held-out PSNR with these exposures.
+exposed() {
+  [ -s "$work/$3.json" ] || "$tessera" eval "$work/$1" "$work/beach" --exposure "$2" --json "$work/$3.json" \
+    --report "$work/$3.html" ${lpips:+--lpips "$lpips"} "${@:4}" > /dev/null
+  jq .psnr "$work/$3.json"
+}
+
+exposure() {
+  [ -e "$work/beach/transforms.json" ] ||
+    "$tessera" import "$data/brighton_beach" "$work/beach" --downscale 4 --holdout every:8
+  local seed model neutral predicted
+  for seed in ${SEEDS:-1 2 3}; do
+    model=beach-$seed
+    trained "$model" beach --method field --minutes "${MINUTES:-10}" --seed "$seed"
+    neutral=$(exposed "$model" neutral "$model-neutral")
+    predicted=$(exposed "$model" predicted "$model-predicted")
+    echo "brighton_beach, seed $seed: neutral $neutral dB, predicted $predicted dB"
+    verdict "seed $seed, predicted less neutral, held-out PSNR in dB" "$(shortfall "$predicted" "$neutral")" '>=' 0.4
+    verdict "seed $seed, fitted less predicted on the right halves, held-out PSNR in dB" \
+      "$(shortfall "$(exposed "$model" fitted "$model-fitted")" \
+        "$(exposed "$model" predicted "$model-right" --right-halves)")" '<=' 0.2
+  done
 }
 
 truth() {
@@ -84,5 +110,5 @@ PYTHON
   verdict "untagged, worst error in metres" "$(value untagged .shape.worst_metres)" '<=' 1
 }
 
-for row in ${ROWS:-brighton fox survey untagged}; do "$row"; done
+for row in ${ROWS:-brighton fox exposure survey untagged}; do "$row"; done
 finish

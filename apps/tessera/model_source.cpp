@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "representations/methods.h"
+#include "train/photo_exposures.h"
 
 namespace tessera {
 namespace {
@@ -21,6 +22,7 @@ class ModelRenderSource final : public RenderSource {
   std::vector<SurfaceCoverage> coverage() const override {
     return readCoverage(findModelMethod(folder_), folder_.root());
   }
+  std::optional<ExposureResponse> exposureResponse() const override { return readExposureResponse(folder_); }
 
  private:
   ModelFolder folder_;

@@ -2,10 +2,12 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 
 #include "base/file.h"
 #include "compute/device.h"
 #include "scene/capture.h"
+#include "scene/exposure_response.h"
 #include "scene/surface_coverage.h"
 #include "scene/view_renderer.h"
 
@@ -22,6 +24,8 @@ class RenderSource {
   virtual std::vector<std::string> trainedOnAmong(const Capture& capture, Split split) const = 0;
   // Returns how well its surfaces cover what the training photos show; nothing if training has not checked it.
   virtual std::vector<SurfaceCoverage> coverage() const = 0;
+  // Returns how its colours follow the exposure of a photo; nothing if that is not known.
+  virtual std::optional<ExposureResponse> exposureResponse() const = 0;
 };
 
 struct RenderSourceOptions {

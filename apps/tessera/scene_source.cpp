@@ -106,6 +106,7 @@ class SceneRenderSource final : public RenderSource {
     return {};
   }  // scenes do not record their training photos
   std::vector<SurfaceCoverage> coverage() const override { return tileset_.coverage; }
+  std::optional<ExposureResponse> exposureResponse() const override { return tileset_.exposureResponse; }
 
  private:
   fs::path folder_;

@@ -11,6 +11,7 @@
 #include "base/progress.h"
 #include "import/capture_reader.h"
 #include "representations/methods.h"
+#include "train/photo_exposures.h"
 #include "train/run_folder.h"
 
 namespace tessera {
@@ -146,6 +147,7 @@ void addBakeVerb(CLI::App& app) {
       progress.setTotal(all);
       progress.update(done);
     };
+    flags->options.exposureResponse = readExposureResponse(folder);
     const BakedScene baked = bakeScene(*baker, capture, flags->scene, flags->options);
     progress.finish();
     if (flags->json) {

@@ -18,6 +18,7 @@ void addEvalVerb(CLI::App& app) {
     std::string model, capture, split = "test", exposure = "neutral", json, report, images, lpips;
     DeviceOptions device;
     int level = 0;
+    bool rightHalves = false;
     double memoryMiB = 0;
   };
   auto flags = std::make_shared<Flags>();
@@ -28,9 +29,12 @@ void addEvalVerb(CLI::App& app) {
   verb->add_option("--split", flags->split, "which photos")
       ->capture_default_str()
       ->check(CLI::IsMember({"test", "validation", "train"}));
-  verb->add_option("--exposure", flags->exposure, "neutral, or fitted on the left half and evaluated on the right")
+  verb->add_option("--exposure", flags->exposure,
+                   "neutral, predicted from EXIF, or fitted on the left half and evaluated on the right")
       ->capture_default_str()
-      ->check(CLI::IsMember({"neutral", "fitted"}));
+      ->check(CLI::IsMember({"neutral", "predicted", "fitted"}));
+  verb->add_flag("--right-halves", flags->rightHalves,
+                 "evaluate colour on the right half of each view, to compare with fitted exposures");
   verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
   verb->add_option("--report", flags->report, "write a self-contained report.html here; default MODEL/report.html");
   verb->add_option("--images", flags->images, "write each rendering and its error map as PNG into this folder");
@@ -56,7 +60,16 @@ void addEvalVerb(CLI::App& app) {
         options.split != Split::train && !known.empty()) {
       warn("{} of the views were trained on ('{}' first): the numbers flatter the model", known.size(), known.front());
     }
-    options.fitExposure = flags->exposure == "fitted";
+    options.exposures = *exposuresFromName(flags->exposure);
+    options.rightHalves = flags->rightHalves;
+    if (options.exposures == Exposures::predicted) {
+      options.response = renderSource->exposureResponse();
+      if (!options.response) {
+        throw Error(flags->model, "--exposure predicted",
+                    "does not tell how colours follow exposures: EXIF does not explain the gains of its photos",
+                    "use neutral or fitted");
+      }
+    }
     options.lpipsWeights = flags->lpips;
     options.imagesDir = flags->images;
     options.threads = flags->device.threads;
@@ -84,7 +97,7 @@ void addEvalVerb(CLI::App& app) {
       fmt::print("{} views: PSNR {:.2f} dB, SSIM {:.4f}{}, exposure {}, {:.2f} s a frame on {}\n", report.views.size(),
                  report.psnr, report.ssim,
                  report.lpips ? fmt::format(", LPIPS ({}) {:.4f}", report.lpipsNet, *report.lpips) : "",
-                 exposureName(report.fitExposure), report.secondsPerFrame, report.device);
+                 describeExposures(report), report.secondsPerFrame, report.device);
     }
     std::fflush(stdout);
     const fs::path page = flags->report.empty() ? fs::path(flags->model) / "report.html" : fs::path(flags->report);

@@ -60,6 +60,7 @@ class WorldRenderSource final : public RenderSource {
   }
   std::vector<std::string> trainedOnAmong(const Capture&, Split) const override { return {}; }
   std::vector<SurfaceCoverage> coverage() const override { return {}; }
+  std::optional<ExposureResponse> exposureResponse() const override { return std::nullopt; }
 
  private:
   fs::path worldFile_;

@@ -6,6 +6,8 @@
 #include <functional>
 #include <optional>
 
+#include "scene/exposure_response.h"
+
 namespace tessera {
 
 struct BakeOptions {
@@ -19,6 +21,8 @@ struct BakeOptions {
   // Every stride-th pixel along rows and columns is used; doubled at each coarser level that has a model of its own.
   int stride = 1;
   int effort = 4;  // compression effort, 0 to 9
+  // How colours follow the exposure of a photo, which the scene states.
+  std::optional<ExposureResponse> exposureResponse;
   // Reports progress in steps: a step is a photo that has been processed with one model, or a part that has been baked
   // without photos. For a model that holds only few blocks at a time, photos are processed in parts.
   std::function<void(int64_t done, int64_t all)> onStep = [](int64_t, int64_t) {};

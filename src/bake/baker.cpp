@@ -7,6 +7,7 @@ namespace tessera {
 BakedScene bakeScene(Baker& baker, const Capture& capture, const fs::path& scene, const BakeOptions& options) {
   SceneDescription description = baker.description();
   description.background = options.background.value_or(description.background);
+  description.exposureResponse = options.exposureResponse;
   SceneWriter writer(scene, capture, description);
   baker.bake(capture, options, writer);
   return writer.commit();

@@ -54,6 +54,7 @@ struct SceneDescription {
   double near = 0.05;                          // scene units
   std::array<float, 3> background = kHazySky;  // for directions that no photo shows, unless BakeOptions override it
   std::vector<SurfaceCoverage> coverage = {};  // of the surfaces of the finest level, if it was checked
+  std::optional<ExposureResponse> exposureResponse = {};  // that of BakeOptions
 };
 
 // The baker of an opened model of some method.

@@ -37,6 +37,7 @@ SceneWriter::SceneWriter(const fs::path& folder, const Capture& capture, const S
   tileset_.near = about.near;
   tileset_.background = about.background;
   tileset_.coverage = about.coverage;
+  tileset_.exposureResponse = about.exposureResponse;
   placeOn(tileset_, about.grid);
 }
 

@@ -102,6 +102,10 @@ ImageF withMaskedPixelsFrom(ImageF image, const ImageF& other, const ImageU8& ma
   return image;
 }
 
+bool comparesRightHalves(const EvaluateOptions& options) {
+  return options.rightHalves || options.exposures == Exposures::fitted;
+}
+
 class ViewEvaluator {
  public:
   explicit ViewEvaluator(const EvaluateOptions& options)
@@ -139,7 +143,8 @@ class ViewEvaluator {
     }
 
     ImageF rendered = compositeOver(view, renderer.background());
-    if (options_.fitExposure) result.gain = fittedGain(rendered, target, maskPointer);
+    if (options_.exposures == Exposures::fitted) result.gain = fittedGain(rendered, target, maskPointer);
+    if (options_.exposures == Exposures::predicted) result.gain = options_.response->gain(photo.exposure);
     for (size_t i = 0; i < rendered.pixels.size(); ++i) {
       const float value = rendered.pixels[i] * static_cast<float>(result.gain[i % 3]);
       rendered.pixels[i] = value > 0 ? std::min(value, 1.0f) : 0.0f;  // NaN becomes black, and shows as an error
@@ -147,7 +152,7 @@ class ViewEvaluator {
 
     std::optional<ImageF> measured;
     if (!photo.depth.empty()) measured = readDepth(photo.depth, photo.depthUnit);
-    if (options_.fitExposure) {
+    if (comparesRightHalves(options_)) {
       std::optional<ImageU8> halfMask;
       if (mask) halfMask = rightHalf(*mask);
       compare(rightHalf(target), rightHalf(rendered), halfMask ? &*halfMask : nullptr, result);
@@ -225,10 +230,15 @@ EvaluationReport evaluate(ViewRenderer& renderer, const Capture& capture, const 
     throw Error(capture.root.string(), "", fmt::format("no photo is in the split \"{}\"", splitName(options.split)),
                 "import with --holdout every:8, or choose another --split");
   }
+  if (options.exposures == Exposures::predicted && !options.response) {
+    throw Error(capture.root.string(), "", "has no response to exposures that could be predicted with",
+                "evaluate with neutral exposures");
+  }
   ViewEvaluator evaluator(options);
   EvaluationReport report;
   report.split = options.split;
-  report.fitExposure = options.fitExposure;
+  report.exposures = options.exposures;
+  report.rightHalves = comparesRightHalves(options);
   report.lpipsNet = evaluator.lpipsNet();
   report.device = renderer.device();
   for (const int index : indices) {

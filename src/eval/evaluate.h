@@ -11,6 +11,7 @@
 #include "base/image.h"
 #include "eval/depth_error.h"
 #include "scene/capture.h"
+#include "scene/exposure_response.h"
 #include "scene/surface_coverage.h"
 #include "scene/view_renderer.h"
 
@@ -23,7 +24,7 @@ struct ViewResult {
   std::optional<double> lpips;             // nothing without weights, or if the image is too small for the network
   std::optional<DepthError> depth;         // nothing if the photo has no depth map
   double compared = 1;                     // share of its pixels that were compared
-  std::array<double, 3> gain = {1, 1, 1};  // factor applied to the render; 1 with neutral exposure
+  std::array<double, 3> gain = {1, 1, 1};  // factor applied to the render; 1 with neutral exposures
   double seconds = 0;                      // time of rendering alone
 };
 
@@ -37,12 +38,18 @@ struct ViewPictures {
   const ImageF* measuredDepth;  // the photo's, of any size; null without one
 };
 
+// Photos of the same place differ in exposure. Neutral: the render is evaluated as it is. Predicted: times the gain
+// that follows from the photo's exposure by EXIF. Fitted: times one gain per channel that is fitted by least squares on
+// the left half of the view.
+enum class Exposures { neutral, predicted, fitted };
+
 struct EvaluateOptions {
   Split split = Split::test;
-  // Photos of the same place differ in exposure. False (neutral): the render is evaluated as it is. True (fitted): one
-  // gain per channel is fitted by least squares on the left half of the view, and colour is evaluated on the right half
-  // alone (depth, which does not depend on exposure, on the whole view).
-  bool fitExposure = false;
+  Exposures exposures = Exposures::neutral;
+  std::optional<ExposureResponse> response;  // for Exposures::predicted, which needs it
+  // Colour is evaluated on the right half of each view alone, as it is with fitted exposures (depth, which does not
+  // depend on exposure, on the whole view): to compare with these.
+  bool rightHalves = false;
   fs::path lpipsWeights;  // safetensors; empty: no LPIPS
   fs::path imagesDir;     // where NAME.png and NAME.error.png of each view are written; empty: nowhere
   int threads = 0;        // of LPIPS; 0: all
@@ -60,7 +67,8 @@ struct EvaluationReport {
   double secondsPerFrame = 0;
   std::string device;
   Split split = Split::test;
-  bool fitExposure = false;
+  Exposures exposures = Exposures::neutral;
+  bool rightHalves = false;  // whether colour was evaluated on these alone
   // Of the surfaces of what was evaluated: for callers that know it to set. Empty if it was not checked.
   std::vector<SurfaceCoverage> coverage;
 };
@@ -72,7 +80,8 @@ struct EvaluationReport {
 // LPIPS they are replaced in the render by the photo's pixels. Unless ViewRenderer::showsOutside, pixels of photos
 // without alpha in which the render is less than half opaque are excluded in the same way: they show what lies outside.
 //
-// Throws Error if the split is empty, or a photo, mask, depth or the weights cannot be read.
+// Throws Error if predicted exposures have no response, or if the split is empty, or a photo, mask, depth or the
+// weights cannot be read.
 EvaluationReport evaluate(ViewRenderer& renderer, const Capture& capture, const EvaluateOptions& options);
 
 // Returns one JSON object: psnr, ssim, lpips (null without weights), lpips_net, depth (null without depth maps),
@@ -81,6 +90,7 @@ std::string toJson(const EvaluationReport& report);
 
 std::string_view splitName(Split split);
 std::optional<Split> splitFromName(std::string_view name);
-std::string_view exposureName(bool fitted);  // "neutral", or a description of the fit
+std::optional<Exposures> exposuresFromName(std::string_view name);
+std::string describeExposures(const EvaluationReport& report);  // "neutral", or how they were predicted or fitted
 
 }  // namespace tessera

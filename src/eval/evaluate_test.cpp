@@ -135,7 +135,7 @@ TEST(Evaluate, FitsAGainOnTheLeftHalfAndEvaluatesTheRightHalf) {
   FakeRenderer renderer({dark});
   EvaluateOptions options;
   EXPECT_LT(evaluate(renderer, fake.capture, options).psnr, 20);
-  options.fitExposure = true;
+  options.exposures = Exposures::fitted;
   const EvaluationReport report = evaluate(renderer, fake.capture, options);
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(report.views[0].gain[c], gain[c], 1e-5);
   EXPECT_GT(report.psnr, 90);
@@ -151,6 +151,41 @@ TEST(Evaluate, FitsAGainOnTheLeftHalfAndEvaluatesTheRightHalf) {
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(second.views[0].gain[c], gain[c], 1e-5);
   EXPECT_LT(second.psnr, 20);
   EXPECT_NE(toJson(second).find("fitted on the left half, judged on the right"), std::string::npos);
+}
+
+TEST(Evaluate, AppliesTheGainThatAPhotosExposurePredicts) {
+  FakeCapture fake("evaluate_predicted");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  fake.add("a", photo).exposure = 0.5;
+  ImageF dark = toFloat(photo);
+  const double gain[3] = {std::exp2(0.2), std::exp2(0.25), std::exp2(0.4)};
+  for (size_t i = 0; i < dark.pixels.size(); ++i) dark.pixels[i] /= static_cast<float>(gain[i % 3]);
+  FakeRenderer renderer({dark});
+  EvaluateOptions options;
+  options.exposures = Exposures::predicted;
+  EXPECT_THROW(evaluate(renderer, fake.capture, options), Error);
+  options.response = ExposureResponse{{0.4f, 0.4f, 0.8f}, {0, 0.05f, 0}};
+  const EvaluationReport report = evaluate(renderer, fake.capture, options);
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(report.views[0].gain[c], gain[c], 1e-5);
+  EXPECT_GT(report.psnr, 90);
+  EXPECT_NE(toJson(report).find("predicted from EXIF"), std::string::npos);
+}
+
+TEST(Evaluate, ComparesTheRightHalvesAloneIfAskedTo) {
+  FakeCapture fake("evaluate_right");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  fake.add("a", photo);
+  ImageF wrong = toFloat(photo);
+  for (int y = 0; y < 48; ++y)
+    for (int x = 0; x < 32; ++x)
+      for (int c = 0; c < 3; ++c) wrong.at(x, y)[c] *= 0.5f;
+  FakeRenderer renderer({wrong});
+  EXPECT_LT(evaluate(renderer, fake.capture, {}).psnr, 25);
+  EvaluateOptions options;
+  options.rightHalves = true;
+  const EvaluationReport report = evaluate(renderer, fake.capture, options);
+  EXPECT_EQ(report.psnr, kMaximumPsnr);
+  EXPECT_NE(toJson(report).find("neutral, judged on the right half"), std::string::npos);
 }
 
 TEST(Evaluate, MeasuresDepthWhereThePhotoHasIt) {
@@ -241,7 +276,7 @@ TEST(Evaluate, ReportsLpipsWithWeights) {
   EXPECT_EQ(report.lpipsNet, "squeeze");
   FakeRenderer perfect({toFloat(photo)});
   EXPECT_EQ(*evaluate(perfect, fake.capture, options).lpips, 0.0);
-  options.fitExposure = true;  // the right half, 32 pixels wide, is still large enough
+  options.exposures = Exposures::fitted;  // the right half, 32 pixels wide, is still large enough
   EXPECT_TRUE(evaluate(perfect, fake.capture, options).lpips);
 }
 

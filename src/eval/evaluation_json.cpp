@@ -43,8 +43,17 @@ std::optional<Split> splitFromName(std::string_view name) {
   return std::nullopt;
 }
 
-std::string_view exposureName(bool fitted) {
-  return fitted ? "fitted on the left half, judged on the right" : "neutral";
+std::optional<Exposures> exposuresFromName(std::string_view name) {
+  if (name == "neutral") return Exposures::neutral;
+  if (name == "predicted") return Exposures::predicted;
+  if (name == "fitted") return Exposures::fitted;
+  return std::nullopt;
+}
+
+std::string describeExposures(const EvaluationReport& report) {
+  if (report.exposures == Exposures::fitted) return "fitted on the left half, judged on the right";
+  return std::string(report.exposures == Exposures::predicted ? "predicted from EXIF" : "neutral") +
+         (report.rightHalves ? ", judged on the right half" : "");
 }
 
 std::string toJson(const EvaluationReport& report) {
@@ -57,7 +66,7 @@ std::string toJson(const EvaluationReport& report) {
                         {"depth", depthObject(view.depth)},
                         {"compared", view.compared},
                         {"seconds", number(view.seconds)}};
-    if (report.fitExposure) one["gain"] = view.gain;
+    if (report.exposures != Exposures::neutral) one["gain"] = view.gain;
     views.push_back(std::move(one));
   }
   ordered_json object = {{"psnr", number(report.psnr)},
@@ -69,7 +78,7 @@ std::string toJson(const EvaluationReport& report) {
                          {"views", std::move(views)},
                          {"seconds_per_frame", number(report.secondsPerFrame)},
                          {"device", report.device},
-                         {"exposure", exposureName(report.fitExposure)},
+                         {"exposure", describeExposures(report)},
                          {"split", splitName(report.split)},
                          {"units",
                           {{"psnr", "dB, mean over views, unrounded rendering against photo bytes / 255, at most 99"},

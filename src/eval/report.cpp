@@ -83,7 +83,7 @@ std::string summary(const EvaluationReport& report) {
   html += fmt::format(
       "<p class=\"quiet\" style=\"margin-top:.9rem\">Exposure: {}. PSNR compares the unrounded rendering "
       "with the photo's bytes; SSIM uses 11×11 Gaussian windows that lie wholly inside the image.</p>\n",
-      escapedHtml(exposureName(report.fitExposure)));
+      escapedHtml(describeExposures(report)));
   return html;
 }
 
@@ -120,7 +120,7 @@ std::string table(const EvaluationReport& report, const std::vector<size_t>& ord
       "<th>SSIM</th>";
   if (report.lpips) html += "<th>LPIPS</th>";
   if (report.depth) html += "<th>depth error</th><th>within 1.25</th>";
-  if (report.fitExposure) html += "<th>gain r, g, b</th>";
+  if (report.exposures != Exposures::neutral) html += "<th>gain r, g, b</th>";
   html += "<th>time</th></tr>\n";
   for (const size_t i : order) {
     const ViewResult& view = report.views[i];
@@ -132,7 +132,7 @@ std::string table(const EvaluationReport& report, const std::vector<size_t>& ord
                                        100 * view.depth->within125)
                          : "<td>–</td><td>–</td>";
     }
-    if (report.fitExposure) {
+    if (report.exposures != Exposures::neutral) {
       html += fmt::format("<td>{:.3f}, {:.3f}, {:.3f}</td>", view.gain[0], view.gain[1], view.gain[2]);
     }
     html += fmt::format("<td>{}</td></tr>\n", formattedSeconds(view.seconds));

@@ -15,6 +15,7 @@
 
 #include "scene/block_grid.h"
 #include "scene/capture.h"
+#include "scene/exposure_response.h"
 #include "scene/surface_coverage.h"
 
 namespace tessera {
@@ -110,7 +111,9 @@ struct Tileset {
   double geometricError = 0;  // metres: error of drawing nothing at all; at least the root's
   std::vector<SharedResource> resources;
   std::vector<SurfaceCoverage> coverage;  // of the finest level, for people; empty if it was not checked
-  std::vector<Tile> tiles;                // the root first
+  // How colours follow the exposure of a photo, for programs that compare; nothing if it does not tell.
+  std::optional<ExposureResponse> exposureResponse;
+  std::vector<Tile> tiles;  // the root first
 
   const Tile& root() const { return tiles.front(); }
   SceneBox box() const;

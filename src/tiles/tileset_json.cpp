@@ -101,6 +101,8 @@ Json sceneToJson(const Tileset& tileset) {
     scene["resources"].push_back(std::move(entry));
   }
   if (!tileset.coverage.empty()) scene["coverage"] = coverageToJson(tileset.coverage);
+  if (const auto& response = tileset.exposureResponse)
+    scene["exposureResponse"] = {{"slope", response->slope}, {"offset", response->offset}};
   return scene;
 }
 

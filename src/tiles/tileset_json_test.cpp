@@ -20,6 +20,7 @@ void expectSame(const Tileset& a, const Tileset& b) {
   EXPECT_EQ(a.sourceFromWorld, b.sourceFromWorld);
   EXPECT_EQ(a.background, b.background);
   EXPECT_EQ(a.coverage, b.coverage);
+  EXPECT_EQ(a.exposureResponse, b.exposureResponse);
   ASSERT_EQ(a.tiles.size(), b.tiles.size());
   for (size_t i = 0; i < a.tiles.size(); ++i) {
     const Tile &one = a.tiles[i], &other = b.tiles[i];
@@ -47,6 +48,7 @@ TEST(TilesetJson, RoundTripsTilesets) {
       tileset.representation = representation;
       tileset.near = 0.1 + 0.2;  // no short decimal
       if (georeferenced) tileset.coverage = {{"block_1_0", 5000000000, 12}, {"block_0_0", 7, 0}};
+      if (georeferenced) tileset.exposureResponse = {{0.4f, 0.5f, 0.6f}, {0.01f, -0.02f, 0}};
       std::string reason;
       const auto again = decodeTileset(encodeTileset(tileset), reason);
       ASSERT_TRUE(again) << reason;
@@ -162,6 +164,15 @@ TEST_F(TilesetJsonRefusal, RejectsInvalidNumbers) {
   refuses("tile 1: its level", [](json& file) { file["root"]["children"][0].erase("geometricError"); });
   refuses("tile 1: its level", [](json& file) { ours(file["root"]["children"][0])["cells"][1] = -1; });
   refuses("tile 1: its level", [](json& file) { ours(file["root"]["children"][0])["cells"] = {0, 0, 1}; });
+}
+
+TEST_F(TilesetJsonRefusal, RejectsImpossibleExposureResponses) {
+  const auto set = [](const json& value) { return [value](json& file) { ours(file)["exposureResponse"] = value; }; };
+  refuses("the exposureResponse lacks numbers", set(3));
+  refuses("the exposureResponse lacks numbers", set({{"slope", {1, 2, 3}}}));
+  refuses("the exposureResponse lacks numbers", set({{"slope", {1, 2}}, {"offset", {0, 0, 0}}}));
+  refuses("the exposureResponse is out of bounds", set({{"slope", {1, 2, 17}}, {"offset", {0, 0, 0}}}));
+  refuses("the exposureResponse is out of bounds", set({{"slope", {1, 2, 3}}, {"offset", {0, 1e300, 0}}}));
 }
 
 TEST_F(TilesetJsonRefusal, RejectsImpossibleCoverage) {

@@ -57,7 +57,7 @@ class TilesetReader {
 
   std::optional<Tileset> read(const json& file) {
     if (!readAsset(file) || !readScene(*tesseraExtension(file)) || !readResources(*tesseraExtension(file)) ||
-        !readCoverage(*tesseraExtension(file)))
+        !readCoverage(*tesseraExtension(file)) || !readExposureResponse(*tesseraExtension(file)))
       return std::nullopt;
     const auto error = getNumber(file, "geometricError");
     const json* root = getField(file, "root");
@@ -172,6 +172,19 @@ class TilesetReader {
                  open = holes ? unsignedFrom(*holes, kMaxCoveragePixels) : std::nullopt;
       if (!name || !all || !open) return fail("the coverage of a part lacks its name or its numbers");
       tileset_.coverage.push_back({*name, *all, *open});
+    }
+    return true;
+  }
+
+  bool readExposureResponse(const json& ours) {
+    const json* response = getField(ours, "exposureResponse");
+    if (!response) return true;
+    const auto slope = getNumbers<3>(*response, "slope"), offset = getNumbers<3>(*response, "offset");
+    if (!slope || !offset) return fail("the exposureResponse lacks numbers");
+    tileset_.exposureResponse.emplace();
+    for (size_t c = 0; c < 3; ++c) {
+      tileset_.exposureResponse->slope[c] = static_cast<float>((*slope)[c]);
+      tileset_.exposureResponse->offset[c] = static_cast<float>((*offset)[c]);
     }
     return true;
   }

@@ -110,6 +110,15 @@ Broken ruleOfResources(const Tileset& tileset) {
   return std::nullopt;
 }
 
+Broken ruleOfExposureResponse(const Tileset& tileset) {
+  constexpr float kMax = 16;  // stops, and stops per stop
+  if (!tileset.exposureResponse) return std::nullopt;
+  for (const auto& numbers : {tileset.exposureResponse->slope, tileset.exposureResponse->offset})
+    for (const float number : numbers)
+      if (!(std::abs(number) <= kMax)) return "the exposureResponse is out of bounds";
+  return std::nullopt;
+}
+
 Broken ruleOfCoverage(const Tileset& tileset) {
   for (const SurfaceCoverage& part : tileset.coverage)
     if (part.holes > part.pixels) return "the coverage of a part counts more holes than pixels";
@@ -233,6 +242,7 @@ std::optional<std::string> validationError(const Tileset& tileset) {
   if (auto broken = ruleOfFrames(tileset)) return broken;
   if (auto broken = ruleOfResources(tileset)) return broken;
   if (auto broken = ruleOfCoverage(tileset)) return broken;
+  if (auto broken = ruleOfExposureResponse(tileset)) return broken;
   if (!(tileset.geometricError >= tileset.root().geometricError && tileset.geometricError <= kFarthest)) {
     return "the tileset's geometric error is below its root's";
   }

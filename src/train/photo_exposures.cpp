@@ -1,11 +1,60 @@
 #include "train/photo_exposures.h"
 
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+
 namespace tessera {
+namespace {
+
+constexpr const char* kResponse = "exposure_response";  // slopes, then offsets: 6 numbers
+
+std::optional<ExposureResponse> responseIn(const fs::path& path, const Safetensors& checkpoint) {
+  if (!checkpoint.tensors.contains(kResponse)) return std::nullopt;
+  const auto values = checkpoint.require(path, kResponse, TensorType::f32).as<float>();
+  if (values.size() != 6 || !std::all_of(values.begin(), values.end(), [](float x) { return std::isfinite(x); }))
+    throw Error(path.string(), std::string("tensor ") + kResponse, "does not have six finite numbers", "train again");
+  ExposureResponse response;
+  std::copy_n(values.begin(), 3, response.slope.begin());
+  std::copy_n(values.begin() + 3, 3, response.offset.begin());
+  return response;
+}
+
+}  // namespace
+
+std::optional<ExposureResponse> readExposureResponse(const ModelFolder& model) {
+  const auto manifest = model.manifest();
+  if (!manifest) return std::nullopt;
+  for (const std::string& name : manifest->files) {
+    const fs::path file = model.root() / name;
+    if (file.extension() == ".json") {  // of a model that consists of models
+      if (const auto response = readExposureResponse(ModelFolder(file.parent_path()))) return response;
+      continue;
+    }
+    // The first part that trains exposures tells; the others need not be read.
+    const Safetensors checkpoint = readSafetensors(file);
+    if (checkpoint.tensors.contains("exposures")) return responseIn(file, checkpoint);
+  }
+  return std::nullopt;
+}
 
 PhotoExposures::PhotoExposures(Device& device, const Capture& capture)
     : device_(device),
       trainingPhotos_(capture.photosIn(Split::train)),
-      group_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {}
+      group_(device, "exposures", std::vector<float>(capture.photos.size() * 3)) {
+  for (const Photo& photo : capture.photos) exposures_.push_back(photo.exposure);
+}
+
+void PhotoExposures::save(TensorSet& tensors) {
+  tensors.add(device_, group_, true);
+  const std::vector<float> gains = device_.read(group_.values.all());
+  const auto response = fitExposureResponse(exposures_, trainingPhotos_, gains);
+  if (!response) return;
+  std::vector<float> values(response->slope.begin(), response->slope.end());
+  values.insert(values.end(), response->offset.begin(), response->offset.end());
+  tensors.add(kResponse, values);
+}
 
 void PhotoExposures::step(const Adam& adam, bool train) {
   if (train) {

@@ -4,8 +4,14 @@
 
 #include "field/parameters.h"
 #include "scene/capture.h"
+#include "scene/exposure_response.h"
+#include "train/model_folder.h"
 
 namespace tessera {
+
+// Returns the response that a model's checkpoint contains; nothing if there is none. Throws Error if a file cannot be
+// read or is malformed.
+std::optional<ExposureResponse> readExposureResponse(const ModelFolder& model);
 
 class PhotoExposures {
  public:
@@ -23,13 +29,15 @@ class PhotoExposures {
   void centre();
 
   bool allFinite() const { return group_.allFinite(device_); }
-  void save(TensorSet& tensors) { tensors.add(device_, group_, true); }
+  // Saves also the response to the exposures that the photos' EXIF states, if they explain the gains.
+  void save(TensorSet& tensors);
   void restore(const fs::path& path, const Safetensors& file) { loadGroup(device_, path, file, group_); }
   // Restores the exposures of the first `photos` from a training on these alone; the others stay as they are.
   void restoreFirst(const fs::path& path, const Safetensors& file, size_t photos);
 
  private:
   Device& device_;
+  std::vector<double> exposures_;  // by EXIF, of each photo
   std::vector<int> trainingPhotos_;
   ParameterGroup group_;
 };
