@@ -7,9 +7,12 @@
 #             infinite) and 0.5 m (worst); scale, rotation and middle from GPS within twice the predicted standard errors
 #   exposure  brighton_beach at 400x225, ten minutes of `field`: exposures predicted from EXIF at least 0.4 dB above neutral, and on the
 #             right halves of the views at most 0.2 dB below fitted ones
+#   killed    brighton_beach to an evaluated scene of `volume`, killed 20 times, at least once in each stage: all photos get poses, at most
+#             three minutes are repeated each time, no program survives, and the scene has the bytes of an unbroken training
 #   untagged  the same photographs as in survey, without EXIF and XMP: at least 95 % get poses, none more than 1 m off
+# Of each run: its time within twice what it had expected at the start, stages within 1.5 times, memory between half and all of it.
 # Resumable: everything is kept in build/bench/photos, and what exists is not made again.
-#   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox exposure survey untagged"] [SEEDS="1 2 3"] [MINUTES=10] bench/photos.sh
+#   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox exposure killed survey untagged"] [SEEDS="1 2 3"] [MINUTES=10] bench/photos.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
@@ -23,6 +26,19 @@ posed() {
   "$tessera" run "$2" "$work/$1" --until capture --holdout none
   jq -r '.stages[] | select(.seconds >= 1) |
     "\(.name): \(.seconds / 6 | round / 10) min, \(.peak_bytes / 1048576 | round) MiB: \(.summary)"' "$work/$1/run.json"
+  planned "$1"
+}
+# planned NAME: what a run has taken against what it had expected. Times above 1 are longer than expected.
+planned() {
+  local run=$work/$1/run.json ratio
+  ratio() { jq "$1" "$run"; }
+  verdict "$1, time, of that expected at the start" "$(ratio '([.stages[].seconds] | add) / .expected.seconds')" '<=' 2
+  verdict "$1, the same" "$(ratio '([.stages[].seconds] | add) / .expected.seconds')" '>=' 0.5
+  verdict "$1, stages of more than 30 s against what was expected when they began, the worst ratio" \
+    "$(ratio '[1, (.stages[] | select(.seconds > 30) | .seconds / .expected_seconds | if . < 1 then 1 / . else . end)] | max')" \
+    '<=' 1.5
+  verdict "$1, most memory, of that expected" "$(ratio '([.stages[].peak_bytes] | max) / .expected.peak_bytes')" '<=' 1
+  verdict "$1, the same" "$(ratio '([.stages[].peak_bytes] | max) / .expected.peak_bytes')" '>=' 0.5
 }
 registered() { jq '.frames | length' "$work/$1/capture/transforms.json"; }
 
@@ -110,5 +126,29 @@ PYTHON
   verdict "untagged, worst error in metres" "$(value untagged .shape.worst_metres)" '<=' 1
 }
 
-for row in ${ROWS:-brighton fox exposure survey untagged}; do "$row"; done
+# A run to an evaluated scene, and the same killed again and again. Poses depend on the order in which threads end, so the
+# scenes are compared that result from one capture.
+killed() {
+  local method=(--method volume --steps "${STEPS:-300}" --downscale 4) record=$work/killed.json
+  local photos=$data/brighton_beach/images seed=${SEED:-1}
+  [ -s "$work/whole/eval.json" ] || "$tessera" run "$photos" "$work/whole" "${method[@]}"
+  planned whole
+  rm -rf "$work/killed" "$work/again"
+  cp "$work/whole/run.json" "$record.unbroken"
+  python3 bench/kill_run.py "$seed" 20 "$record" -- "$tessera" run "$photos" "$work/killed" "${method[@]}"
+  # What follows the capture, unbroken.
+  cp -r "$work/killed" "$work/again"
+  rm -rf "$work/again"/{model,model.earlier*,scene,eval.json}
+  "$tessera" run "$photos" "$work/again" "${method[@]}" --from train
+  verdict "brighton_beach, killed, registered of 18" "$(registered killed)" '>=' 18
+  verdict "the same, kills" "$(jq .kills "$record")" '>=' 20
+  verdict "the same, stages in which it was killed, of $(jq '.reached | length' "$record")" \
+    "$(jq '[.reached[] | select(. > 0)] | length' "$record")" '>=' "$(jq '.reached | length' "$record")"
+  verdict "the same, programs that survived" "$(jq .survivors "$record")" '<=' 0
+  verdict "the same, seconds repeated for each kill" "$(jq .repeated_seconds_per_kill "$record")" '<=' 180
+  verdict "the same, files of the scene that differ from the unbroken one" \
+    "$(diff -rq "$work/killed/scene" "$work/again/scene" | wc -l)" '<=' 0
+}
+
+for row in ${ROWS:-brighton fox exposure killed survey untagged}; do "$row"; done
 finish

@@ -18,6 +18,16 @@ std::vector<std::string> bakedMethods() {
   return names;
 }
 
+TrainingCosts costsOf(const std::string& method) {
+  const MethodCosts costs = findMethod(method)->costs;
+  return {.secondsPerStep = costs.secondsPerStep,
+          .bakeSeconds = costs.bakeSeconds,
+          .secondsPerBakedMegapixel = costs.secondsPerBakedMegapixel,
+          .secondsPerRenderedMegapixel = costs.secondsPerRenderedMegapixel,
+          .trainBytes = costs.trainBytes,
+          .modelBytes = costs.modelBytes};
+}
+
 }  // namespace
 
 void addRunVerb(CLI::App& app) {
@@ -45,6 +55,8 @@ void addRunVerb(CLI::App& app) {
       ->check(CLI::Range(0, 64));
   verb->add_option("--holdout", options->holdout, "photos held out for evaluation: every:N, list:FILE or none")
       ->capture_default_str();
+  verb->add_flag("--dry-run", options->dryRun,
+                 "only state the time, memory and disk of each stage, after features and matches of five photos");
   verb->add_option("--from", options->range.from, "run this stage and all after it again");
   verb->add_option("--until", options->range.until, "the last stage to run");
   verb->add_option("--threads", options->threads, "CPU threads; 0: all cores")
@@ -52,6 +64,7 @@ void addRunVerb(CLI::App& app) {
       ->check(CLI::Range(0, 1024));
   verb->callback([options] {
     options->program = fs::read_symlink("/proc/self/exe").string();
+    options->costs = costsOf(options->method);
     options->interrupted = interrupted;
     catchInterrupts();
     try {

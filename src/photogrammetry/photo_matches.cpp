@@ -37,12 +37,16 @@ bool isTruncated(const fs::path& file) {
 
 }  // namespace
 
-int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes) {
+int64_t extractionBytes(int threads, int64_t pixels) {
   // COLMAP reduces photos to a longer side of 3200 pixels, and takes about 370 bytes for each pixel (measured).
   constexpr int64_t kMaxPixels = 3200 * 3200, kBytesPerPixel = 370;
+  return threads * kBytesPerPixel * std::clamp(pixels, int64_t{1}, kMaxPixels);
+}
+
+int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes) {
   constexpr double kShare = 0.7;  // of the memory: the rest is for other programs
   if (threads <= 0) threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  const double each = static_cast<double>(kBytesPerPixel * std::clamp(pixels, int64_t{1}, kMaxPixels));
+  const auto each = static_cast<double>(extractionBytes(1, pixels));
   const double fitting = kShare * static_cast<double>(memoryBytes) / each;
   return fitting >= threads ? threads : std::max(1, static_cast<int>(fitting));
 }
@@ -156,6 +160,22 @@ void PhotoMatches::match(const std::vector<PhotoPair>& pairs, const Watch& watch
         [&] { watch(static_cast<int64_t>(pairs.size() - missing.size() + begin)); });
     watch(static_cast<int64_t>(pairs.size() - missing.size() + end));
   }
+}
+
+PhotoMatches::Counts PhotoMatches::count() const {
+  Counts counts;
+  std::error_code status;
+  if (!fs::exists(database(), status)) return counts;
+  const ColmapDatabase database(this->database());
+  for (const auto& [photo, features] : database.features()) {
+    ++counts.photos;
+    counts.features += features;
+  }
+  for (const auto& [pair, inliers] : database.inliers()) {
+    ++counts.pairs;
+    counts.inliers += inliers;
+  }
+  return counts;
 }
 
 size_t PhotoMatches::linkedPairs() const {

@@ -16,6 +16,8 @@ namespace tessera {
 // Returns how many of `threads` (0: all of the machine's) can extract features of photos of so many pixels at once, in
 // so many bytes of memory: at least one.
 int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes);
+// Returns the memory that so many of them take, in bytes.
+int64_t extractionBytes(int threads, int64_t pixels);
 
 class PhotoMatches {
  public:
@@ -33,6 +35,11 @@ class PhotoMatches {
   void discardMatches() const;
   // Compares pairs that have not been compared yet.
   void match(const std::vector<PhotoPair>& pairs, const Watch& watch);
+  struct Counts {
+    int64_t photos = 0, features = 0;  // photos with features, and the features of all
+    int64_t pairs = 0, inliers = 0;    // pairs that were compared, and the inliers of all
+  };
+  Counts count() const;        // of what was done so far; zeros before
   size_t linkedPairs() const;  // of those compared, the pairs that one geometry explains
   // Returns these photos with the likely reason why they are not in the model. `photos` are indices into the list, of
   // which those in `apart` are in another model.

@@ -8,6 +8,7 @@
 #include "base/child_process.h"
 #include "base/error.h"
 #include "base/log.h"
+#include "base/memory.h"
 #include "base/order_statistics.h"
 #include "base/progress.h"
 #include "import/georeference.h"
@@ -19,6 +20,7 @@
 #include "photogrammetry/photo_pairs.h"
 #include "pipeline/echoed_line.h"
 #include "pipeline/folder_lock.h"
+#include "pipeline/run_estimator.h"
 
 namespace tessera {
 namespace {
@@ -103,6 +105,7 @@ class PhotoRun {
     const ColmapSettings colmap{.threads = options.threads};
     matches_ = std::make_unique<PhotoMatches>(out("poses"), list_, colmap);
     models_ = std::make_unique<PhotoModels>(out("poses"), list_, colmap);
+    estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, describePhotos(), downscale());
   }
 
   std::vector<Stage> stages() {
@@ -114,20 +117,25 @@ class PhotoRun {
          .settings = "",
          .isComplete = has("poses/database.db"),
          .discard = [this] { matches_->discard(); },
+         .needs = [this](bool resumes) { return estimator_->featureNeeds(resumes); },
          .run = [this](bool) { return features(); }},
         {.name = "pairs",
          .settings = "",
          .isComplete = has("poses/pairs.json"),
+         .needs =
+             [this](bool) { return needsLookAlikes(list_) ? estimator_->matchingNeeds().lookAlikes : StageNeeds{}; },
          .run = [this](bool) { return pairs(); }},
         {.name = "matches",
          .settings = "",
          .isComplete = has("poses/database.db"),
          .discard = [this] { matches_->discardMatches(); },
+         .needs = [this](bool resumes) { return estimator_->matchNeeds(resumes); },
          .run = [this](bool) { return matches(); }},
         {.name = "mapping",
          .settings = "",
          .isComplete = has("poses/sparse"),
          .discard = [this] { models_->discardMapped(); },
+         .needs = [this](bool) { return estimator_->matchingNeeds().mapping; },
          .run = [this](bool resumes) { return mapping(resumes); }},
         {.name = "remapping",
          .settings = "",
@@ -137,6 +145,7 @@ class PhotoRun {
          .settings = "",
          .isComplete = has("poses/adjusted"),
          .discard = [this] { models_->discardAdjusted(); },
+         .needs = [this](bool) { return estimator_->matchingNeeds().adjusting; },
          .run = [this](bool) { return adjusting(); }},
         {.name = "georeferencing",
          .settings = "",
@@ -145,19 +154,23 @@ class PhotoRun {
         {.name = "capture",
          .settings = fmt::format("{} {}", downscale(), describeHoldOut()),
          .isComplete = has("capture/transforms.json"),
+         .needs = [this](bool) { return estimator_->trainingNeeds().capture; },
          .run = [this](bool) { return capture(); }},
         {.name = "train",
          .settings = fmt::format("--method {} {}", options_.method, training),
          .isComplete = has("model/manifest.json"),
          .discard = [this] { setModelAside(); },
+         .needs = [this](bool) { return estimator_->trainingNeeds().train; },
          .run = [this](bool) { return train(); }},
         {.name = "bake",
          .settings = "",
          .isComplete = has("scene/tileset.json"),
+         .needs = [this](bool) { return estimator_->trainingNeeds().bake; },
          .run = [this](bool) { return bake(); }},
         {.name = "evaluate",
          .settings = "",
          .isComplete = [this] { return options_.holdout == "none" || has("eval.json")(); },
+         .needs = [this](bool) { return estimator_->trainingNeeds().evaluate; },
          .run = [this](bool) { return evaluate(); }},
     };
   }
@@ -309,8 +322,7 @@ class PhotoRun {
     if (fit->isBent()) {
       warn(
           "the heights of GPS bend by {:.1f} m ± {:.1f} m from the middle of the photos to the farthest: the poses "
-          "form a "
-          "{}; photos that look aslant, or lines that cross at another height, prevent it",
+          "form a {}; photos that look aslant, or lines that cross at another height, prevent it",
           fit->bend->metres, fit->bend->error, fit->bend->metres > 0 ? "dome" : "bowl");
     }
     return {0, fmt::format("{} of {} GPS fixes agree; standard errors: {:.2f} % of the scale, {:.2f}°, {:.2f} m",
@@ -409,7 +421,19 @@ class PhotoRun {
   PhotoList list_;
   std::unique_ptr<PhotoMatches> matches_;
   std::unique_ptr<PhotoModels> models_;
+  std::unique_ptr<RunEstimator> estimator_;
 };
+
+// States what will be taken; refuses what does not fit.
+void announce(const RunPlan& plan, const fs::path& folder) {
+  constexpr double kGiB = 1 << 30, kGigabyte = 1e9, kLongSeconds = 30;
+  const StageNeeds total = plan.total();
+  if (total.seconds > kLongSeconds) {
+    inform("this will take about {}, up to {:.1f} GiB of memory and {:.2f} GB of disk", describeDuration(total.seconds),
+           static_cast<double>(total.memoryBytes) / kGiB, static_cast<double>(total.diskBytes) / kGigabyte);
+  }
+  requireRoom(plan, folder, static_cast<int64_t>(fs::space(folder).available), usableMemoryBytes());
+}
 
 }  // namespace
 
@@ -431,8 +455,13 @@ void runFromPhotos(const PhotoRunOptions& options) {
   }
   const FolderLock lock(options.out);
   PhotoRun run(options);
-  runStages(options.out, fmt::format("run {} {}", options.photos.string(), options.out.string()), run.stages(),
-            options.range, [&] {
+  const std::vector<Stage> stages = run.stages();
+  const RunPlan plan = planStages(options.out, stages, options.range);
+  if (options.dryRun) fmt::print("{}", describePlan(plan));
+  announce(plan, options.out);
+  if (options.dryRun) return;
+  runStages(options.out, fmt::format("run {} {}", options.photos.string(), options.out.string()), stages, options.range,
+            [&] {
               if (options.interrupted()) throw RunInterrupted();
             });
 }

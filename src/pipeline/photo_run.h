@@ -1,5 +1,6 @@
 // From a folder of photos to a scene: the stages of `tessera run`.
 //
+//   (plan)    how long features and matches take of a few photos     probe.json
 //   inspect   which photos can be used; cameras, flights             run.json
 //   features  COLMAP's features                                      poses/database.db
 //   pairs     which photos are compared                              poses/pairs.json
@@ -16,6 +17,7 @@
 #include <string>
 
 #include "base/file.h"
+#include "pipeline/run_plan.h"
 #include "pipeline/stage.h"
 
 namespace tessera {
@@ -29,6 +31,8 @@ struct PhotoRunOptions {
   std::string holdout = "every:8";
   int threads = 0;      // 0: all
   std::string program;  // this program, which trains, bakes and evaluates
+  TrainingCosts costs;  // of `method`
+  bool dryRun = false;  // prints what the run will take, and ends
   StageRange range;
   std::function<bool()> interrupted = [] { return false; };  // asked for now and then; stops the run
 };
@@ -38,7 +42,8 @@ struct RunInterrupted {};
 
 inline constexpr int kLongestSide = 1600;  // pixels
 
-// Runs what is not finished. Throws Error naming what cannot go on, or RunInterrupted; what was done so far is kept.
+// States what will be taken, and runs what is not finished. Throws Error before the first stage if memory or disk are
+// too small. Throws Error naming what cannot go on, or RunInterrupted; what was done so far is kept.
 void runFromPhotos(const PhotoRunOptions& options);
 
 }  // namespace tessera

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/log.h"
 #include "base/memory.h"
 
 namespace tessera {
@@ -15,11 +16,15 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr const char* kRecord = "run.json";
+constexpr double kLongSeconds = 30;  // what takes less is not announced
+
 struct Record {
   std::string digest, summary;
   bool isFinished = false;
   double seconds = 0;
   int64_t peakBytes = 0;
+  StageNeeds expected;
 };
 
 // What run.json of an earlier run says of stages; nothing if the file is missing or damaged: then all is run again.
@@ -45,6 +50,7 @@ std::vector<std::pair<std::string, Record>> readRecords(const fs::path& file, st
     entry.isFinished = stage.contains("finished") && stage["finished"] == true;
     entry.seconds = number("seconds");
     entry.peakBytes = static_cast<int64_t>(number("peak_bytes"));
+    entry.expected = {number("expected_seconds"), static_cast<int64_t>(number("expected_peak_bytes")), 0};
     records.emplace_back(stage["name"].get<std::string>(), entry);
   }
   return records;
@@ -56,17 +62,14 @@ Json toJson(const std::string& name, const Record& result) {
           {"finished", result.isFinished},
           {"seconds", result.seconds},
           {"peak_bytes", result.peakBytes},
+          {"expected_seconds", result.expected.seconds},
+          {"expected_peak_bytes", result.expected.memoryBytes},
           {"summary", result.summary}};
 }
 
 // Names of files need not be UTF-8.
 void write(const Json& run, const fs::path& file) {
   writeFileAtomically(file, run.dump(2, ' ', false, Json::error_handler_t::replace) + "\n", true);
-}
-
-std::string describeSeconds(double seconds) {
-  const auto whole = static_cast<int64_t>(seconds + 0.5);
-  return fmt::format("{}:{:02}", whole / 60, whole % 60);
 }
 
 void requireStage(const std::vector<Stage>& stages, const std::string& name, const char* flag) {
@@ -79,7 +82,79 @@ void requireStage(const std::vector<Stage>& stages, const std::string& name, con
   throw Error(fmt::format("{} {}", flag, name), "", "there is no such stage", "name one of " + names);
 }
 
+std::string describeClock(double seconds) {
+  const auto whole = static_cast<int64_t>(seconds + 0.5);
+  return fmt::format("{}:{:02}", whole / 60, whole % 60);
+}
+
+// What an earlier call has left to do.
+struct Remaining {
+  std::vector<std::string> digests;  // of all stages
+  size_t first = 0, end = 0;         // the stages to run
+  std::vector<Record> known;         // of the stages before these
+  bool resumes = false;              // the first of them was interrupted
+};
+
+Remaining findRemaining(const fs::path& folder, const std::vector<Stage>& stages, const StageRange& range) {
+  requireStage(stages, range.from, "--from");
+  requireStage(stages, range.until, "--until");
+  std::string begunFrom;  // what an interrupted call was asked to run again from
+  const auto before = readRecords(folder / kRecord, begunFrom);
+  const bool wasInterrupted =
+      before.size() < stages.size() ||
+      std::any_of(before.begin(), before.end(), [](const auto& entry) { return !entry.second.isFinished; });
+  const std::string from = wasInterrupted && range.from == begunFrom ? "" : range.from;
+  Remaining remaining;
+  std::string digest;
+  bool again = false;
+  for (const Stage& stage : stages) {
+    digest = textDigest(digest + "\n" + stage.name + "\n" + stage.settings);
+    remaining.digests.push_back(digest);
+    ++remaining.end;
+    // What follows a stage that has to be run is run, too: its results end with those of that stage, also if it is
+    // interrupted.
+    if (!again) {
+      const auto record =
+          std::find_if(before.begin(), before.end(), [&](const auto& entry) { return entry.first == stage.name; });
+      const bool isKnown = stage.name != from && record != before.end() && record->second.digest == digest;
+      if (isKnown && record->second.isFinished && stage.isComplete()) {
+        remaining.known.push_back(record->second);
+        ++remaining.first;
+      } else {
+        again = true;
+        remaining.resumes = isKnown && !record->second.isFinished;
+      }
+    }
+    if (stage.name == range.until) break;
+  }
+  return remaining;
+}
+
+RunPlan planOf(const std::vector<Stage>& stages, const Remaining& remaining) {
+  RunPlan plan;
+  for (size_t i = remaining.first; i < remaining.end; ++i)
+    plan.entries.push_back({stages[i].name, stages[i].needs(i == remaining.first && remaining.resumes)});
+  return plan;
+}
+
 }  // namespace
+
+std::string describeDuration(double seconds) {
+  constexpr double kMinute = 60, kHour = 3600;
+  if (seconds < kMinute) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 2 * kHour) return fmt::format("{:.0f} min", seconds / kMinute);
+  return fmt::format("{:.1f} h", seconds / kHour);
+}
+
+StageNeeds RunPlan::total() const {
+  StageNeeds total;
+  for (const Entry& entry : entries) {
+    total.seconds += entry.needs.seconds;
+    total.memoryBytes = std::max(total.memoryBytes, entry.needs.memoryBytes);
+    total.diskBytes += entry.needs.diskBytes;
+  }
+  return total;
+}
 
 std::string textDigest(const std::string& text) {
   uint64_t hash = 0xcbf29ce484222325;
@@ -87,59 +162,53 @@ std::string textDigest(const std::string& text) {
   return fmt::format("{:016x}", hash);
 }
 
+RunPlan planStages(const fs::path& folder, const std::vector<Stage>& stages, const StageRange& range) {
+  return planOf(stages, findRemaining(folder, stages, range));
+}
+
 void runStages(const fs::path& folder, const std::string& request, const std::vector<Stage>& stages,
                const StageRange& range, const std::function<void()>& check) {
-  requireStage(stages, range.from, "--from");
-  requireStage(stages, range.until, "--until");
-  const fs::path file = folder / "run.json";
-  std::string begunFrom;  // what an interrupted call was asked to run again from
-  const auto before = readRecords(file, begunFrom);
-  const bool wasInterrupted =
-      before.size() < stages.size() ||
-      std::any_of(before.begin(), before.end(), [](const auto& entry) { return !entry.second.isFinished; });
-  const std::string from = wasInterrupted && range.from == begunFrom ? "" : range.from;
+  const Remaining remaining = findRemaining(folder, stages, range);
+  const fs::path file = folder / kRecord;
   Json run = {{"version", 1}, {"request", request}, {"stages", Json::array()}};
   if (!range.from.empty()) run["begun_from"] = range.from;
-  std::string digest;
-  bool again = false;
-  for (const Stage& stage : stages) {
-    digest = textDigest(digest + "\n" + stage.name + "\n" + stage.settings);
-    again = again || stage.name == from;
-    const auto known =
-        std::find_if(before.begin(), before.end(), [&](const auto& entry) { return entry.first == stage.name; });
-    const bool isKnown = !again && known != before.end() && known->second.digest == digest;
-    Record result;
-    if (isKnown && known->second.isFinished && stage.isComplete()) {
-      result = known->second;
-      fmt::print("{:<10} finished before: {}\n", stage.name, result.summary);
-    } else {
-      check();
-      // Results of later stages end with those of this one, also if it is interrupted.
-      again = true;
-      // What it left is discarded before the record says that the stage may be resumed.
-      const bool resumes = isKnown && !known->second.isFinished;
-      result.digest = digest;
-      if (!resumes) {
-        write(run, file);
-        stage.discard();
-      }
-      Json begun = run;
-      begun["stages"].push_back(toJson(stage.name, result));
-      write(begun, file);
-      const auto start = std::chrono::steady_clock::now();
-      const StageOutcome outcome = stage.run(resumes);
-      result.isFinished = true;
-      result.summary = outcome.summary;
-      result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      result.peakBytes = std::max(outcome.peakBytes, residentBytes());
-      fmt::print("{:<10} {}: {}\n", stage.name, describeSeconds(result.seconds), result.summary);
+  const StageNeeds total = planOf(stages, remaining).total();
+  run["expected"] = {{"seconds", total.seconds}, {"peak_bytes", total.memoryBytes}, {"disk_bytes", total.diskBytes}};
+  for (size_t i = 0; i < remaining.first; ++i) {
+    fmt::print("{:<10} finished before: {}\n", stages[i].name, remaining.known[i].summary);
+    run["stages"].push_back(toJson(stages[i].name, remaining.known[i]));
+  }
+  for (size_t i = remaining.first; i < remaining.end; ++i) {
+    const Stage& stage = stages[i];
+    check();
+    // What it left is discarded before the record says that the stage may be resumed.
+    const bool resumes = i == remaining.first && remaining.resumes;
+    if (!resumes) {
+      write(run, file);
+      stage.discard();
     }
+    Record result{.digest = remaining.digests[i], .expected = stage.needs(resumes)};
+    Json begun = run;
+    begun["stages"].push_back(toJson(stage.name, result));
+    write(begun, file);
+    if (i > remaining.first && result.expected.seconds > kLongSeconds)
+      inform("{} will take about {}", stage.name, describeDuration(result.expected.seconds));
+    const auto start = std::chrono::steady_clock::now();
+    const StageOutcome outcome = stage.run(resumes);
+    result.isFinished = true;
+    result.summary = outcome.summary;
+    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    result.peakBytes = std::max(outcome.peakBytes, residentBytes());
+    double left = 0;
+    for (size_t later = i + 1; later < remaining.end; ++later) left += stages[later].needs(false).seconds;
+    fmt::print("{:<10} {}: {}{}\n", stage.name, describeClock(result.seconds), result.summary,
+               left > kLongSeconds ? fmt::format(" (about {} left)", describeDuration(left)) : "");
     std::fflush(stdout);
     run["stages"].push_back(toJson(stage.name, result));
-    if (again) write(run, file);
-    if (stage.name == range.until) break;
+    write(run, file);
   }
-  if (run.erase("begun_from") > 0 && again) write(run, file);
+  std::fflush(stdout);
+  if (run.erase("begun_from") > 0 && remaining.first < remaining.end) write(run, file);
 }
 
 }  // namespace tessera

@@ -16,12 +16,21 @@ struct StageOutcome {
   std::string summary;    // what it achieved, for the line that is printed
 };
 
+// What a stage will take.
+struct StageNeeds {
+  double seconds = 0;
+  int64_t memoryBytes = 0;  // at once, of the programs that it runs
+  int64_t diskBytes = 0;    // that it adds
+};
+
 struct Stage {
   std::string name;
   std::string settings;  // what its result depends on, besides the results of earlier stages
   std::function<bool()> isComplete = [] { return true; };  // whether what it wrote is still there
   // Removes what a result for other settings has left, which `run` must not use; called before it begins anew.
   std::function<void()> discard = [] {};
+  // What it will take, by what is known when this is called.
+  std::function<StageNeeds(bool resumes)> needs = [](bool) { return StageNeeds{}; };
   // `resumes`: it was interrupted, and nothing that its result depends on has changed since: what it has written so far
   // may be used.
   std::function<StageOutcome(bool resumes)> run;
@@ -34,12 +43,30 @@ struct StageRange {
   std::string until;  // the last stage to run; empty: all
 };
 
-// Runs the stages in order, and prints a line for each on stdout. `request` describes the run in run.json. Throws Error
-// if a stage of `range` does not exist, and what a stage or `check` throws, which is called before each stage that
-// runs.
+// What the stages of a range that are not finished will take, in their order.
+struct RunPlan {
+  struct Entry {
+    std::string stage;
+    StageNeeds needs;
+  };
+  std::vector<Entry> entries;
+
+  StageNeeds total() const;  // the sums of seconds and of disk, and the most memory at once
+};
+
+// Plans what `runStages` would run. Throws Error if a stage of `range` does not exist.
+RunPlan planStages(const fs::path& folder, const std::vector<Stage>& stages, const StageRange& range);
+
+// Runs the stages in order, and prints a line for each on stdout, with the time that those after it will take. run.json
+// records what they were expected to take, all before the first one runs, and each when it begins. `request` describes
+// the run in run.json. Throws Error if a stage of `range` does not exist, and what a stage or `check` throws, which is
+// called before each stage that runs.
 void runStages(
     const fs::path& folder, const std::string& request, const std::vector<Stage>& stages, const StageRange& range,
     const std::function<void()>& check = [] {});
+
+// Returns a time for people: "40 s", "12 min", "3.5 h".
+std::string describeDuration(double seconds);
 
 // Returns a digest of a text, 16 hexadecimal digits.
 std::string textDigest(const std::string& text);

@@ -162,5 +162,64 @@ TEST_F(Stages, SurviveADamagedRecord) {
   }
 }
 
+// Three stages of a minute each, of which a resumed one takes half a minute.
+std::vector<Stage> minutesEach(const std::function<void(const std::string&)>& run) {
+  std::vector<Stage> stages;
+  for (const std::string name : {"one", "two", "three"}) {
+    stages.push_back({.name = name,
+                      .needs =
+                          [](bool resumes) {
+                            return StageNeeds{resumes ? 30.0 : 60.0, 1000, 7};
+                          },
+                      .run =
+                          [run, name](bool) {
+                            run(name);
+                            return StageOutcome{0, "done"};
+                          }});
+  }
+  return stages;
+}
+
+TEST(StagePlan, CountsWhatIsNotFinished) {
+  const TemporaryFolder folder;
+  const auto stages = minutesEach([](const std::string& name) {
+    if (name == "two") throw Error(name, "", "fails", "repair it");
+  });
+  const RunPlan all = planStages(folder.path(), stages, {});
+  EXPECT_EQ(all.entries.size(), 3U);
+  EXPECT_EQ(all.total().seconds, 180);
+  EXPECT_EQ(all.total().memoryBytes, 1000);
+  EXPECT_EQ(all.total().diskBytes, 21);
+  EXPECT_EQ(planStages(folder.path(), stages, {.until = "two"}).total().seconds, 120);
+  EXPECT_THROW(planStages(folder.path(), stages, {.until = "four"}), Error);
+  EXPECT_THROW(runStages(folder.path(), "test", stages, {}), Error);
+  const RunPlan left = planStages(folder.path(), stages, {});
+  ASSERT_EQ(left.entries.size(), 2U);
+  EXPECT_EQ(left.entries[0].stage, "two");
+  EXPECT_EQ(left.total().seconds, 90) << "the second stage was begun";
+  EXPECT_EQ(planStages(folder.path(), stages, {.from = "one"}).total().seconds, 180);
+}
+
+TEST(StagePlan, IsRecordedBeforeTheFirstStageAndForEach) {
+  const TemporaryFolder folder;
+  std::string record;
+  const auto stages = minutesEach([&](const std::string& name) {
+    if (name == "two") record = readTextFile(folder / "run.json");
+  });
+  testing::internal::CaptureStdout();
+  runStages(folder.path(), "test", stages, {});
+  const std::string printed = testing::internal::GetCapturedStdout();
+  EXPECT_NE(record.find("\"seconds\": 180"), record.npos) << record;
+  EXPECT_NE(record.find("\"expected_seconds\": 60"), record.npos) << record;
+  EXPECT_NE(printed.find("one        0:00: done (about 2 min left)"), printed.npos) << printed;
+  EXPECT_NE(printed.find("three      0:00: done\n"), printed.npos) << printed;
+}
+
+TEST(StagePlan, HasDurationsForPeople) {
+  EXPECT_EQ(describeDuration(44.6), "45 s");
+  EXPECT_EQ(describeDuration(600), "10 min");
+  EXPECT_EQ(describeDuration(9000), "2.5 h");
+}
+
 }  // namespace
 }  // namespace tessera

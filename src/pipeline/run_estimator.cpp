@@ -1,0 +1,95 @@
+#include "pipeline/run_estimator.h"
+
+#include <algorithm>
+#include <thread>
+
+#include "base/order_statistics.h"
+#include "import/holdout.h"
+
+namespace tessera {
+
+RunEstimator::RunEstimator(const PhotoRunOptions& options, const PhotoList& list, const PhotoMatches& matches,
+                           std::string photosDigest, int downscale)
+    : options_(options),
+      list_(list),
+      matches_(matches),
+      photosDigest_(std::move(photosDigest)),
+      downscale_(downscale) {}
+
+const MatchingRates& RunEstimator::rates() {
+  if (rates_) return *rates_;
+  const fs::path file = options_.out / "probe.json";
+  const std::string key = photosDigest_ + " " + std::to_string(options_.threads);
+  std::error_code status;
+  if (fs::exists(file, status)) rates_ = decodeMatchingRates(readTextFile(file), key);
+  if (!rates_) {
+    const auto stop = [this] {
+      if (options_.interrupted()) throw RunInterrupted();
+    };
+    rates_ = measureMatchingRates(list_, options_.threads, options_.out / "probe", stop);
+    writeFileAtomically(file, encodeMatchingRates(*rates_, key));
+  }
+  return *rates_;
+}
+
+// The number of pairs that are compared, as far as it is known before the look-alikes are.
+int64_t RunEstimator::expectedPairs() {
+  constexpr double kPairsPerPhoto = 13;  // of look-alikes: they are mutual, and neighbours look alike
+  if (expectedPairs_ == 0) {
+    expectedPairs_ = static_cast<int64_t>(choosePairs(list_, {}).size());
+    if (needsLookAlikes(list_))
+      expectedPairs_ += static_cast<int64_t>(kPairsPerPhoto * static_cast<double>(list_.photos.size()));
+  }
+  return expectedPairs_;
+}
+
+MatchingNeeds RunEstimator::matchingNeeds() {
+  const PhotoMatches::Counts counts = matches_.count();
+  MatchingSize size{
+      .photos = static_cast<int64_t>(list_.photos.size()), .pairs = expectedPairs(), .threads = threads()};
+  for (const CameraBody& body : list_.bodies) size.pixels = std::max(size.pixels, int64_t{body.width} * body.height);
+  if (counts.photos == size.photos) size.features = counts.features;
+  if (counts.pairs >= size.pairs) size.inliers = counts.inliers;
+  return planMatching(size, rates());
+}
+
+StageNeeds RunEstimator::featureNeeds(bool resumes) {
+  StageNeeds needs = matchingNeeds().features;
+  if (resumes) needs.seconds *= 1 - static_cast<double>(matches_.count().photos) / list_.photos.size();
+  return needs;
+}
+
+StageNeeds RunEstimator::matchNeeds(bool resumes) {
+  StageNeeds needs = matchingNeeds().matches;
+  if (resumes) needs.seconds *= std::max(0.0, 1 - static_cast<double>(matches_.count().pairs) / expectedPairs());
+  return needs;
+}
+
+TrainingNeeds RunEstimator::trainingNeeds() {
+  TrainingSize size{.photos = static_cast<int64_t>(list_.photos.size()),
+                    .minutes = options_.minutes,
+                    .steps = options_.steps,
+                    .relativeSeconds = relativeSeconds(rates())};
+  std::vector<Photo> photos(list_.photos.size());
+  std::vector<int64_t> pixels;
+  for (size_t i = 0; i < photos.size(); ++i) {
+    std::error_code status;
+    photos[i].name = list_.photos[i].name;
+    const auto bytes = fs::file_size(list_.photos[i].file, status);
+    size.sourceBytes += status ? 0 : static_cast<int64_t>(bytes);
+    const CameraBody& body = list_.bodies[static_cast<size_t>(list_.photos[i].body)];
+    pixels.push_back(int64_t{body.width} * body.height);
+  }
+  holdOut(options_.holdout, photos);
+  size.heldOut =
+      std::count_if(photos.begin(), photos.end(), [](const Photo& photo) { return photo.split == Split::test; });
+  size.sourcePixels = upperMedian(pixels);
+  size.photoPixels = size.sourcePixels / (int64_t{downscale_} * downscale_);
+  return planTraining(size, options_.costs);
+}
+
+int RunEstimator::threads() const {
+  return options_.threads > 0 ? options_.threads : static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+}
+
+}  // namespace tessera

@@ -1,0 +1,204 @@
+#include "pipeline/run_plan.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "base/memory.h"
+#include "photogrammetry/photo_matches.h"
+
+namespace tessera {
+namespace {
+
+using Seconds = std::chrono::duration<double>;
+using SteadyClock = std::chrono::steady_clock;
+
+constexpr int64_t kMiB = 1 << 20;
+constexpr size_t kProbed = 5;               // photos: ten pairs
+constexpr size_t kFewestToProbe = 15;       // photos: of fewer, a probe is a large part of the task
+constexpr double kFeatureSeconds = 0.2e-3;  // of two cores, for each feature (measured on three sets of photos)
+
+// The photos of one camera from the middle of those of the most frequent camera.
+PhotoList photosToProbe(const PhotoList& list) {
+  std::vector<size_t> counts(list.bodies.size());
+  for (const ListedPhoto& photo : list.photos) ++counts[static_cast<size_t>(photo.body)];
+  const auto body = static_cast<int>(std::max_element(counts.begin(), counts.end()) - counts.begin());
+  std::vector<ListedPhoto> ofBody;
+  std::copy_if(list.photos.begin(), list.photos.end(), std::back_inserter(ofBody),
+               [body](const ListedPhoto& photo) { return photo.body == body; });
+  const size_t count = std::min(kProbed, ofBody.size());
+  const auto begin = ofBody.begin() + static_cast<std::ptrdiff_t>((ofBody.size() - count) / 2);
+  PhotoList chosen;
+  chosen.bodies = list.bodies;
+  chosen.photos.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
+  chosen.flights = list.flights;
+  return chosen;
+}
+
+MatchingRates probe(const PhotoList& chosen, int threads, const fs::path& folder, const std::function<void()>& look) {
+  PhotoMatches matches(folder, chosen, {.threads = threads});
+  const auto start = SteadyClock::now();
+  matches.extractFeatures([&](int64_t) { look(); });
+  const auto extracted = SteadyClock::now();
+  std::vector<PhotoPair> pairs;
+  const auto count = static_cast<int>(chosen.photos.size());
+  for (int first = 0; first < count; ++first)
+    for (int second = first + 1; second < count; ++second) pairs.emplace_back(first, second);
+  matches.match(pairs, [&](int64_t) { look(); });
+  const auto matched = SteadyClock::now();
+  const PhotoMatches::Counts counts = matches.count();
+  return {.secondsPerPhoto = Seconds(extracted - start).count() / count,
+          .secondsPerPair = Seconds(matched - extracted).count() / static_cast<double>(pairs.size()),
+          .featuresPerPhoto = static_cast<double>(counts.features) / count,
+          .inliersPerPair = static_cast<double>(counts.inliers) / static_cast<double>(pairs.size())};
+}
+
+}  // namespace
+
+MatchingRates measureMatchingRates(const PhotoList& list, int threads, const fs::path& folder,
+                                   const std::function<void()>& look) {
+  if (list.photos.size() < kFewestToProbe) return {};
+  std::error_code status;
+  fs::remove_all(folder, status);
+  fs::create_directories(folder, status);
+  if (status) throw Error(folder.string(), "", "cannot be made: " + status.message(), "name another folder");
+  ColmapProgram(folder / "probe.log");  // throws if there is none that can be used
+  MatchingRates rates;
+  try {
+    inform("a few photos are tried, to tell how long all will take");
+    rates = probe(photosToProbe(list), threads, folder, look);
+  } catch (const ColmapKilled&) {
+    throw;
+  } catch (const Error& error) {
+    warn("how long features and matches take is not known: {}", error.what());
+  }
+  fs::remove_all(folder, status);
+  return rates;
+}
+
+std::string encodeMatchingRates(const MatchingRates& rates, const std::string& key) {
+  const nlohmann::ordered_json json = {{"of", key},
+                                       {"seconds_per_photo", rates.secondsPerPhoto},
+                                       {"seconds_per_pair", rates.secondsPerPair},
+                                       {"features_per_photo", rates.featuresPerPhoto},
+                                       {"inliers_per_pair", rates.inliersPerPair}};
+  return json.dump(2) + "\n";
+}
+
+std::optional<MatchingRates> decodeMatchingRates(const std::string& text, const std::string& key) {
+  const auto json = nlohmann::json::parse(text, nullptr, false);
+  if (!json.is_object() || !json.contains("of") || json["of"] != key) return std::nullopt;
+  MatchingRates rates;
+  const std::pair<const char*, double*> fields[] = {{"seconds_per_photo", &rates.secondsPerPhoto},
+                                                    {"seconds_per_pair", &rates.secondsPerPair},
+                                                    {"features_per_photo", &rates.featuresPerPhoto},
+                                                    {"inliers_per_pair", &rates.inliersPerPair}};
+  for (const auto& [name, value] : fields) {
+    if (!json.contains(name) || !json[name].is_number()) return std::nullopt;
+    *value = json[name].get<double>();
+    if (!(*value >= 0 && *value < 1e9)) return std::nullopt;
+  }
+  return rates;
+}
+
+double relativeSeconds(const MatchingRates& rates) {
+  if (rates.featuresPerPhoto < 1) return 1;
+  return std::clamp(rates.secondsPerPhoto / (rates.featuresPerPhoto * kFeatureSeconds), 0.05, 20.0);
+}
+
+// The constants are fitted to three sets of 18 to 202 photos: docs/benchmarks.md, "Photographs without poses".
+MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates) {
+  constexpr double kSecondsPerInlier = 0.155e-3, kFewestSeconds = 8, kAdjustingPerInlier = 0.027e-3;
+  constexpr double kOfNeighbours = 0.6;  // inliers of all pairs, relative to those of neighbours
+  constexpr double kLookAlikeSeconds = 0.45;
+  constexpr int64_t kBytesPerFeature = 155, kBytesPerInlier = 16, kModelBytesPerInlier = 31, kModels = 4;
+  constexpr int64_t kMapperBytesPerInlier = 540, kMapperBytesPerFeature = 110;
+  const double speed = relativeSeconds(rates);
+  const auto photos = static_cast<double>(size.photos), pairs = static_cast<double>(size.pairs);
+  const double features = size.features > 0 ? static_cast<double>(size.features) : photos * rates.featuresPerPhoto;
+  const double inliers =
+      size.inliers > 0 ? static_cast<double>(size.inliers) : pairs * rates.inliersPerPair * kOfNeighbours;
+  const auto bytes = [](double each, double count) { return static_cast<int64_t>(each * count); };
+  MatchingNeeds needs;
+  const int extracting = extractionThreads(size.threads, size.pixels, usableMemoryBytes());
+  needs.features = {photos * rates.secondsPerPhoto, 32 * kMiB + extractionBytes(extracting, size.pixels),
+                    bytes(kBytesPerFeature, features)};
+  needs.lookAlikes = {photos * kLookAlikeSeconds * speed, 64 * kMiB + bytes(kBytesPerFeature, features),
+                      bytes(0.03 * kBytesPerFeature, features)};
+  needs.matches = {pairs * rates.secondsPerPair, 64 * kMiB + bytes(3000, rates.featuresPerPhoto),
+                   bytes(kBytesPerInlier, inliers)};
+  const int64_t mapper = 32 * kMiB + bytes(kMapperBytesPerInlier, inliers) + bytes(kMapperBytesPerFeature, features);
+  needs.mapping = {(kFewestSeconds + kSecondsPerInlier * inliers) * speed, mapper,
+                   bytes(kModelBytesPerInlier * kModels, inliers)};
+  needs.adjusting = {(1 + kAdjustingPerInlier * inliers) * speed, mapper, bytes(kModelBytesPerInlier, inliers)};
+  return needs;
+}
+
+TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs) {
+  constexpr double kImportSeconds = 0.04e-6;  // for each pixel of a photo that is made smaller
+  constexpr double kStartAndEnd = 5;          // seconds, of a program
+  constexpr double kBytesPerPixel = 3.3;      // of a photo in memory
+  constexpr double kMostOfPhotos = 0.4;       // of the memory: of more, training holds some at a time
+  const auto photos = static_cast<double>(size.photos), heldOut = static_cast<double>(size.heldOut);
+  const auto pixels = static_cast<double>(size.photoPixels);
+  const double speed = size.relativeSeconds;
+  const bool isReduced = size.photoPixels < size.sourcePixels;
+  const double shrunk =
+      isReduced && size.sourcePixels > 0 ? std::min(1.0, 4 * pixels / static_cast<double>(size.sourcePixels)) : 1;
+  TrainingNeeds needs;
+  needs.capture = {
+      isReduced ? photos * static_cast<double>(size.sourcePixels) * kImportSeconds * speed : photos * 0.005, 32 * kMiB,
+      static_cast<int64_t>(static_cast<double>(size.sourceBytes) * shrunk)};
+  const double training =
+      size.steps > 0 ? static_cast<double>(size.steps) * costs.secondsPerStep * speed : 60 * size.minutes;
+  needs.train = {
+      training + kStartAndEnd,
+      costs.trainBytes + static_cast<int64_t>(std::min(kBytesPerPixel * pixels * (photos - heldOut),
+                                                       kMostOfPhotos * static_cast<double>(usableMemoryBytes()))),
+      costs.modelBytes};
+  needs.bake = {kStartAndEnd + costs.bakeSeconds * speed +
+                    (photos - heldOut) * pixels * 1e-6 * costs.secondsPerBakedMegapixel * speed,
+                costs.trainBytes / 2, 0};
+  if (size.heldOut > 0)
+    needs.evaluate = {kStartAndEnd + heldOut * pixels * 1e-6 * costs.secondsPerRenderedMegapixel * speed,
+                      costs.trainBytes / 2, 0};
+  return needs;
+}
+
+std::string describePlan(const RunPlan& plan) {
+  constexpr double kMiBytes = 1 << 20, kMegabyte = 1e6;
+  const auto row = [&](const std::string& name, const StageNeeds& needs) {
+    return fmt::format("{:<15} {:>8} {:>8.0f} MiB {:>10.0f} MB\n", name, describeDuration(needs.seconds),
+                       static_cast<double>(needs.memoryBytes) / kMiBytes,
+                       static_cast<double>(needs.diskBytes) / kMegabyte);
+  };
+  std::string text = fmt::format("{:<15} {:>8} {:>12} {:>13}\n", "stage", "time", "memory", "disk");
+  for (const RunPlan::Entry& entry : plan.entries) text += row(entry.stage, entry.needs);
+  return text + row("all", plan.total());
+}
+
+void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes, int64_t memoryBytes) {
+  constexpr double kGigabyte = 1e9, kGiB = 1 << 30;
+  const int64_t disk = plan.total().diskBytes;
+  if (disk > freeBytes) {
+    throw Error(folder.string(), "",
+                fmt::format("would take {:.1f} GB, and {:.1f} GB of its disk are free",
+                            static_cast<double>(disk) / kGigabyte, static_cast<double>(freeBytes) / kGigabyte),
+                "name a folder on another disk, or make the photos smaller");
+  }
+  for (const RunPlan::Entry& entry : plan.entries) {
+    if (entry.needs.memoryBytes <= memoryBytes) continue;
+    throw Error(
+        "stage " + entry.stage, "",
+        fmt::format("would take {:.1f} GiB of memory of {:.1f} GiB",
+                    static_cast<double>(entry.needs.memoryBytes) / kGiB, static_cast<double>(memoryBytes) / kGiB),
+        "raise --downscale if it is `train`, else use fewer photos; or use a machine with more memory");
+  }
+}
+
+}  // namespace tessera

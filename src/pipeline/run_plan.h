@@ -1,0 +1,89 @@
+// What a run from photos will take: seconds, memory and disk of its stages, from the size of the task and from how fast
+// this machine extracts and matches features of a few of the photos.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "base/file.h"
+#include "photogrammetry/photo_list.h"
+#include "pipeline/stage.h"
+
+namespace tessera {
+
+// What features and matches take on this machine: of a few photos, measured. The defaults are those of two cores and
+// photos of 800×600.
+struct MatchingRates {
+  double secondsPerPhoto = 0.8;    // features
+  double secondsPerPair = 0.3;     // matches
+  double featuresPerPhoto = 4000;  // mean
+  double inliersPerPair = 400;     // mean of neighbours
+};
+
+// Measures them with COLMAP on five successive photos from the middle of the list, in `folder`, which is removed
+// afterwards. `look` is called now and then; what it throws ends the program that runs. Throws Error if COLMAP cannot
+// be run, and returns the defaults, with a warning, if it fails on these photos or if there are too few photos to be
+// worth it.
+MatchingRates measureMatchingRates(const PhotoList& list, int threads, const fs::path& folder,
+                                   const std::function<void()>& look);
+
+// Rates as JSON, with `key`, which tells what they were measured on. Returns nothing for another key, or damaged text.
+std::string encodeMatchingRates(const MatchingRates& rates, const std::string& key);
+std::optional<MatchingRates> decodeMatchingRates(const std::string& text, const std::string& key);
+
+// How large the task is, as far as it is known.
+struct MatchingSize {
+  int64_t photos = 0;
+  int64_t pixels = 0;    // of the largest photo
+  int64_t pairs = 0;     // that are compared
+  int64_t features = 0;  // of all photos; 0: not known yet
+  int64_t inliers = 0;   // of all pairs; 0: not known yet
+  int threads = 0;       // of the machine that are used
+};
+
+// What the stages of structure from motion take, from their beginning to their end.
+struct MatchingNeeds {
+  StageNeeds features, lookAlikes, matches, mapping, adjusting;
+};
+MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates);
+
+// What a representation costs to train, bake and evaluate on two cores, by order of magnitude: measured on small
+// scenes.
+struct TrainingCosts {
+  double secondsPerStep = 0.2;
+  double bakeSeconds = 20;                 // whatever the photos, and
+  double secondsPerBakedMegapixel = 1;     // of the training photos
+  double secondsPerRenderedMegapixel = 1;  // of the photos held out
+  int64_t trainBytes = 0;                  // of memory, besides the photos
+  int64_t modelBytes = 0;                  // on disk, the scene included
+};
+
+// How large the capture is that a model is trained on.
+struct TrainingSize {
+  int64_t photos = 0, heldOut = 0;
+  int64_t photoPixels = 0;     // of one photo of the capture
+  int64_t sourcePixels = 0;    // of one photo as it was taken
+  int64_t sourceBytes = 0;     // on disk, of all photos
+  double minutes = 0;          // of training; or
+  int64_t steps = 0;           // steps, if above 0
+  double relativeSeconds = 1;  // that this machine takes for what takes two cores one
+};
+
+struct TrainingNeeds {
+  StageNeeds capture, train, bake, evaluate;
+};
+TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs);
+
+// Returns a plan as a table, a line for each stage and one for all.
+std::string describePlan(const RunPlan& plan);
+
+// Throws Error, with a remedy, if a plan takes more disk than is free where `folder` is, or a stage more memory than
+// there is.
+void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes, int64_t memoryBytes);
+
+// How many seconds this machine takes for what two cores do in one, by its rates.
+double relativeSeconds(const MatchingRates& rates);
+
+}  // namespace tessera
