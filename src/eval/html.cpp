@@ -2,12 +2,21 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <nlohmann/json.hpp>
 
 namespace tessera {
+namespace {
+
+std::string toUtf8(std::string_view text) {
+  using Json = nlohmann::json;
+  return Json::parse(Json(text).dump(-1, ' ', false, Json::error_handler_t::replace)).get<std::string>();
+}
+
+}  // namespace
 
 std::string escapedHtml(std::string_view text) {
   std::string result;
-  for (const char c : text) {
+  for (const char c : toUtf8(text)) {
     switch (c) {
       case '&':
         result += "&amp;";

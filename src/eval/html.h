@@ -8,7 +8,8 @@
 
 namespace tessera {
 
-// Escapes text for use between tags and inside quoted attributes. Control characters become spaces.
+// Escapes text for use between tags and inside quoted attributes. Control characters become spaces, and bytes that are
+// not UTF-8, as names of files may have, U+FFFD.
 std::string escapedHtml(std::string_view text);
 std::string base64(std::span<const std::byte> bytes);
 

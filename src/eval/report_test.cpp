@@ -128,6 +128,13 @@ TEST(Report, ShowsViewsWithoutNumbersOrImages) {
   EXPECT_LT(html.find("<h3>b</h3>"), html.find("<h3>a</h3>"));
 }
 
+TEST(Html, EscapesWhatIsNotTextOfAPage) {
+  EXPECT_EQ(escapedHtml("<a href=\"b\">'&'"), "&lt;a href=&quot;b&quot;&gt;&#39;&amp;&#39;");
+  EXPECT_EQ(escapedHtml("a\n\tb"), "a  b");
+  EXPECT_EQ(escapedHtml("ä…"), "ä…");
+  EXPECT_EQ(escapedHtml("a\xff<"), "a\xef\xbf\xbd&lt;") << "not UTF-8";
+}
+
 TEST(Html, EncodesBase64WithItsPadding) {
   const auto encoded = [](std::string_view text) { return base64(std::as_bytes(std::span(text.data(), text.size()))); };
   EXPECT_EQ(encoded(""), "");
