@@ -57,7 +57,7 @@ TEST_F(RunCommandLine, NamesWhatToInstallAndWhichStagesThereAre) {
   EXPECT_TRUE(
       contains(said.err,
                "name one of inspect, features, pairs, matches, mapping, remapping, adjusting, georeferencing, capture, "
-               "train, bake, evaluate"))
+               "train, bake, evaluate, report"))
       << said.err;
   const std::string path = std::getenv("PATH");
   ::setenv("PATH", "/nowhere", 1);

@@ -118,6 +118,24 @@ TEST(Exif, ReadsGpsWithItsReferences) {
   EXPECT_FALSE(tags.gimbal.has_value());
 }
 
+// An EXIF block whose only tag is an orientation.
+Bytes exifWithOrientation(uint8_t value) {
+  const std::vector<uint8_t> block = {'E',  'x', 'i', 'f', 0, 0, 'I', 'I', 42,    0, 8, 0, 0, 0, 1, 0,
+                                      0x12, 1,   3,   0,   1, 0, 0,   0,   value, 0, 0, 0, 0, 0, 0, 0};
+  Bytes bytes(block.size());
+  std::transform(block.begin(), block.end(), bytes.begin(), [](uint8_t b) { return std::byte{b}; });
+  return bytes;
+}
+
+TEST(Exif, ReadsHowViewersTurnThePicture) {
+  const auto read = [](uint8_t value) {
+    return decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, exifWithOrientation(value))).orientation;
+  };
+  for (uint8_t value = 1; value <= 8; ++value) EXPECT_EQ(read(value), value);
+  for (const uint8_t value : {0, 9, 255}) EXPECT_EQ(read(value), 1) << "not a value of EXIF";
+  EXPECT_EQ(decodePhotoTags(encodeJpeg(gradientPicture(8, 8))).orientation, 1) << "without the tag";
+}
+
 TEST(Exif, ReturnsNoFixForFilesWithoutGpsTags) {
   EXPECT_FALSE(decodePhotoTags(encodeJpeg(gradientPicture(8, 8))).gps.has_value());
   EXPECT_FALSE(decodePhotoTags(encodePng(gradientPicture(8, 8))).gps.has_value());

@@ -201,7 +201,7 @@ std::vector<LeftOutPhoto> PhotoMatches::explain(const std::vector<int>& photos, 
     std::string reason = "not consistent with the others";
     const fs::path& file = list_.photos[static_cast<size_t>(i)].file;
     if (std::binary_search(apart.begin(), apart.end(), i)) {
-      reason = "of another place: they match each other, but not the rest";
+      reason = kOfAnotherModel;
     } else if (count == features.end()) {
       reason = "not decodable";
     } else if (decoded++ < kMaxDecoded && isTruncated(file)) {

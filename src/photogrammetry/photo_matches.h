@@ -19,6 +19,9 @@ int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes);
 // Returns the memory that so many of them take, in bytes.
 int64_t extractionBytes(int threads, int64_t pixels);
 
+// The reason that `explain` gives for photos of another model.
+inline constexpr char kOfAnotherModel[] = "of another place: they match each other, but not the rest";
+
 class PhotoMatches {
  public:
   // `folder` is created when it is written to. `list` must outlive this object.

@@ -20,46 +20,15 @@
 #include "photogrammetry/photo_pairs.h"
 #include "pipeline/echoed_line.h"
 #include "pipeline/folder_lock.h"
+#include "pipeline/georeference_json.h"
+#include "pipeline/left_out_json.h"
 #include "pipeline/run_estimator.h"
+#include "pipeline/run_report.h"
 
 namespace tessera {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// Names of photos need not be UTF-8.
-std::string dumpJson(const Json& json) {
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-Json toJson(const Georeference& fit, const std::vector<Photo>& photos) {
-  Json residuals = Json::array();
-  for (const Georeference::Residual& residual : fit.residuals) {
-    const auto metres = [](const Vec3d& x) { return Json{x.x(), x.y(), x.z()}; };
-    residuals.push_back({{"photo", photos[static_cast<size_t>(residual.photo)].name},
-                         {"metres", metres(residual.metres)},
-                         {"predicted", metres(residual.predicted)},
-                         {"agrees", residual.isInlier}});
-  }
-  Json matrix = Json::array();
-  for (int row = 0; row < 4; ++row)
-    for (int column = 0; column < 4; ++column) matrix.push_back(fit.frame.enuFromWorld(row, column));
-  Json json = {
-      {"origin",
-       {{"latitude", fit.frame.latitude}, {"longitude", fit.frame.longitude}, {"altitude", fit.frame.altitude}}},
-      {"enu_from_model", std::move(matrix)},
-      {"fixes", fit.fixes},
-      {"agreeing", fit.inliers},
-      {"rms_metres", fit.rmsMetres},
-      {"deviation_metres", {{"horizontal", fit.horizontalDeviation}, {"vertical", fit.verticalDeviation}}},
-      {"standard_errors",
-       {{"scale", fit.scaleError}, {"rotation_degrees", fit.rotationError}, {"middle_metres", fit.middleError}}},
-      {"flights_too_high_metres", fit.heightsTooHigh},
-      {"residuals", std::move(residuals)}};
-  if (fit.bend)
-    json["bend"] = {{"metres", fit.bend->metres}, {"error", fit.bend->error}, {"significant", fit.isBent()}};
-  return json;
-}
 
 struct ChosenPairs {
   std::vector<PhotoPair> pairs;
@@ -169,9 +138,13 @@ class PhotoRun {
          .run = [this](bool) { return bake(); }},
         {.name = "evaluate",
          .settings = "",
-         .isComplete = [this] { return options_.holdout == "none" || has("eval.json")(); },
+         .isComplete = [this] { return !hasHoldOut() || (has("eval.json")() && has("evaluation.html")()); },
          .needs = [this](bool) { return estimator_->trainingNeeds().evaluate; },
          .run = [this](bool) { return evaluate(); }},
+        {.name = "report",
+         .settings = describeLeftOut(),
+         .isComplete = has("report.html"),
+         .run = [this](bool) { return report(); }},
     };
   }
 
@@ -185,6 +158,7 @@ class PhotoRun {
   }
 
   fs::path pairsFile() const { return out("poses/pairs.json"); }
+  fs::path leftOutFile() const { return out("poses/left_out.json"); }
 
   void stopIfInterrupted() const {
     if (options_.interrupted()) throw RunInterrupted();
@@ -206,6 +180,13 @@ class PhotoRun {
     return textDigest(text);
   }
 
+  std::string describeLeftOut() const {
+    std::string text;
+    for (const LeftOutPhoto& photo : list_.leftOut) text += fmt::format("{}\n{}\n", photo.name, photo.reason);
+    return textDigest(text);
+  }
+
+  bool hasHoldOut() const { return options_.holdout != "none"; }
   // Of a list, also what it contains.
   std::string describeHoldOut() const {
     constexpr std::string_view kList = "list:";
@@ -309,6 +290,7 @@ class PhotoRun {
     models_->adjust([this](int64_t) { stopIfInterrupted(); });
     const std::vector<LeftOutPhoto> unplaced = matches_->explain(models_->unplaced(), models_->placedApart());
     warnLeftOut(unplaced);
+    writeLeftOut(leftOutFile(), unplaced);
     return {models_->takePeakBytes(), placedText(unplaced.size())};
   }
 
@@ -316,8 +298,7 @@ class PhotoRun {
     const SourceCapture source = models_->read();
     std::string reason;
     const auto fit = georeference(source.capture.photos, source.flight, reason);
-    const Json described = fit ? toJson(*fit, source.capture.photos) : Json{{"reason", reason}};
-    writeFileAtomically(out("poses/georeference.json"), dumpJson(described));
+    writeGeoreference(out("poses/georeference.json"), fit, reason, source);
     if (!fit) return {0, "none: " + reason};
     if (fit->isBent()) {
       warn(
@@ -408,13 +389,25 @@ class PhotoRun {
   }
 
   StageOutcome evaluate() {
-    if (options_.holdout == "none") return {0, "no photo is held out"};
+    if (!hasHoldOut()) return {0, "no photo is held out"};
     StageOutcome outcome = runVerb("eval", {out("scene").string(), out("capture").string(), "--json",
-                                            out("eval.json").string(), "--report", out("report.html").string()});
+                                            out("eval.json").string(), "--report", out("evaluation.html").string()});
     const Json result = Json::parse(readTextFile(out("eval.json")));
-    outcome.summary =
-        fmt::format("held-out PSNR {:.2f} dB; {}", result.value("psnr", 0.0), out("report.html").string());
+    outcome.summary = fmt::format("held-out PSNR {:.2f} dB", result.value("psnr", 0.0));
     return outcome;
+  }
+
+  StageOutcome report() {
+    // Folders of earlier versions lack it.
+    if (!has("poses/left_out.json")())
+      writeLeftOut(leftOutFile(), matches_->explain(models_->unplaced(), models_->placedApart()));
+    const fs::path folder = fs::absolute(options_.photos / "").lexically_normal().parent_path();
+    writeFileAtomically(out("report.html"), runReport(options_.out, {.title = folder.filename().string(),
+                                                                     .method = options_.method,
+                                                                     .photos = list_.photos,
+                                                                     .leftOut = list_.leftOut,
+                                                                     .hasEvaluation = hasHoldOut()}));
+    return {0, out("report.html").string()};
   }
 
   PhotoRunOptions options_;

@@ -7,10 +7,11 @@
 //   matches   COLMAP's matches of these pairs                        poses/database.db
 //   mapping   COLMAP's models                                        poses/sparse
 //   remapping models that share photos joined, more photos added     poses/joined
-//   adjusting the final bundle adjustment of the largest model       poses/adjusted
+//   adjusting the final bundle adjustment of the largest model       poses/adjusted, poses/left_out.json
 //   georeferencing  the similarity to metres that GPS gives           poses/georeference.json
 //   capture   this model, in metres if it has a georeference         capture/
-//   train, bake, evaluate   this program's verbs, as processes       model/, scene/, report.html, eval.json
+//   train, bake, evaluate   this program's verbs, as processes       model/, scene/, evaluation.html, eval.json
+//   report    a page on all of this                                  report.html
 #pragma once
 
 #include <functional>

@@ -156,6 +156,14 @@ StageNeeds RunPlan::total() const {
   return total;
 }
 
+std::vector<StageRecord> readStageRecords(const fs::path& folder) {
+  std::string begunFrom;
+  std::vector<StageRecord> stages;
+  for (const auto& [name, result] : readRecords(folder / "run.json", begunFrom))
+    if (result.isFinished) stages.push_back({name, result.summary, result.seconds, result.peakBytes});
+  return stages;
+}
+
 std::string textDigest(const std::string& text) {
   uint64_t hash = 0xcbf29ce484222325;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;

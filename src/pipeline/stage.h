@@ -36,6 +36,13 @@ struct Stage {
   std::function<StageOutcome(bool resumes)> run;
 };
 
+// What run.json says of a stage that is finished.
+struct StageRecord {
+  std::string name, summary;
+  double seconds = 0;
+  int64_t peakBytes = 0;
+};
+
 struct StageRange {
   // Run again from this stage on, even if it is finished; empty: what is not finished. A call with the same stage after
   // one that was interrupted goes on with it.
@@ -64,6 +71,10 @@ RunPlan planStages(const fs::path& folder, const std::vector<Stage>& stages, con
 void runStages(
     const fs::path& folder, const std::string& request, const std::vector<Stage>& stages, const StageRange& range,
     const std::function<void()>& check = [] {});
+
+// Returns the finished stages of a run in this folder; to a stage that runs, those before it. Nothing if run.json is
+// missing or damaged.
+std::vector<StageRecord> readStageRecords(const fs::path& folder);
 
 // Returns a time for people: "40 s", "12 min", "3.5 h".
 std::string describeDuration(double seconds);

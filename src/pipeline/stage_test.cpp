@@ -154,6 +154,25 @@ TEST_F(Stages, RunInTheRangeAskedFor) {
   EXPECT_EQ(run({"", "", ""}, {.from = "four"}), "failed");
 }
 
+TEST_F(Stages, ReadWhatIsRecordedOfThoseBeforeThem) {
+  std::vector<StageRecord> records;
+  const auto stage = [&](const char* name) {
+    return Stage{.name = name, .run = [&, name](bool) {
+                   records = readStageRecords(folder_.path());
+                   return StageOutcome{int64_t{1} << 50, std::string("summary of ") + name};
+                 }};
+  };
+  runStages(folder_.path(), "test", {stage("a"), stage("b"), stage("c")}, {});
+  ASSERT_EQ(records.size(), 2u) << "that of the stage itself is not finished";
+  EXPECT_EQ(records[1].name, "b");
+  EXPECT_EQ(records[1].summary, "summary of b");
+  EXPECT_EQ(records[1].peakBytes, int64_t{1} << 50);
+  runStages(folder_.path(), "test", {stage("a"), stage("b"), stage("c")}, {.from = "c"});
+  EXPECT_EQ(records.size(), 2u) << "finished before";
+  writeFileAtomically(folder_ / "run.json", "{");
+  EXPECT_TRUE(readStageRecords(folder_.path()).empty());
+}
+
 TEST_F(Stages, SurviveADamagedRecord) {
   run({"", "", ""});
   for (const char* text : {"", "{", "[]", "{\"stages\": 3}", "{\"stages\": [1, {\"name\": 2}, {\"name\": \"one\"}]}"}) {

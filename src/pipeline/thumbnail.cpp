@@ -1,0 +1,54 @@
+#include "pipeline/thumbnail.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/error.h"
+#include "base/image_io.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kThumbnailQuality = 80;
+
+// JPEG has no alpha.
+ImageU8 withoutAlpha(const ImageU8& image) {
+  if (image.channels != 4) return image;
+  ImageU8 opaque(image.width, image.height, 3);
+  for (size_t i = 0; i < image.pixelCount(); ++i)
+    std::copy_n(image.pixels.begin() + static_cast<std::ptrdiff_t>(4 * i), 3,
+                opaque.pixels.begin() + static_cast<std::ptrdiff_t>(3 * i));
+  return opaque;
+}
+
+}  // namespace
+
+ImageU8 turnUpright(const ImageU8& image, int orientation) {
+  if (orientation <= 1 || orientation > 8) return image;
+  const bool isTransposed = orientation >= 5;
+  const bool fromRight = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
+  const bool fromBottom = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
+  ImageU8 upright(isTransposed ? image.height : image.width, isTransposed ? image.width : image.height, image.channels);
+  for (int y = 0; y < upright.height; ++y) {
+    for (int x = 0; x < upright.width; ++x) {
+      const int column = isTransposed ? y : x, row = isTransposed ? x : y;
+      std::copy_n(image.at(fromRight ? image.width - 1 - column : column, fromBottom ? image.height - 1 - row : row),
+                  image.channels, upright.at(x, y));
+    }
+  }
+  return upright;
+}
+
+std::optional<Thumbnail> makeThumbnail(const fs::path& photo, int orientation, int longestSide) {
+  try {
+    const ImageU8 image = withoutAlpha(readImage(photo).image);
+    const double scale = std::min(1.0, static_cast<double>(longestSide) / std::max(image.width, image.height));
+    const auto scaled = [scale](int side) { return std::max(1, static_cast<int>(std::lround(side * scale))); };
+    const ImageU8 upright = turnUpright(downscaleByArea(image, scaled(image.width), scaled(image.height)), orientation);
+    return Thumbnail{upright.width, upright.height, encodeJpeg(upright, kThumbnailQuality)};
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace tessera
