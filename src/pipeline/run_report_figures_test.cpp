@@ -1,7 +1,10 @@
 #include "pipeline/run_report_figures.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <regex>
 

@@ -1,5 +1,6 @@
 #include "pipeline/run_report.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "base/image_io.h"
 #include "base/testing/temporary_folder.h"
 
