@@ -24,7 +24,7 @@ class RunCommandLine : public testing::Test {
 TEST_F(RunCommandLine, RefusesFoldersWithoutEnoughPhotos) {
   Said said = run({});
   EXPECT_EQ(said.exitCode, 1);
-  EXPECT_TRUE(contains(said.err, "is not a folder")) << said.err;
+  EXPECT_TRUE(contains(said.err, "is neither a folder nor a file")) << said.err;
   writeJpeg(photos_ / "one.jpg", ImageU8(8, 8, 3));
   said = run({});
   EXPECT_EQ(said.exitCode, 1);
@@ -66,6 +66,47 @@ TEST_F(RunCommandLine, NamesWhatToInstallAndWhichStagesThereAre) {
   EXPECT_EQ(said.exitCode, 1);
   EXPECT_TRUE(contains(said.out, "3 photos, 0 with GPS, 0 left out; 1 cameras, 1 flights")) << said.out;
   EXPECT_TRUE(contains(said.err, "apt-get install colmap")) << said.err;
+}
+
+TEST_F(RunCommandLine, TakesPhotosFromAVideo) {
+  if (!isInPath("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed: videos are not tested";
+  for (int i = 0; i < 12; ++i) {
+    ImageU8 picture(64, 48, 3, static_cast<uint8_t>(20 * i));
+    picture.at(3 * i, 2 * i)[0] ^= 255;
+    writePng(folder_ / ("in/" + std::to_string(i) + ".png"), picture);
+  }
+  const fs::path video = folder_ / "a flight.mkv";
+  const std::string command = "ffmpeg -nostdin -loglevel error -framerate 4 -i '" + (folder_ / "in/%d.png").string() +
+                              "' -c:v ffv1 '" + video.string() + "'";
+  ASSERT_EQ(std::system(command.c_str()), 0);
+  const auto run = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"run", video.string(), (folder_ / "out").string(), "--until", "inspect"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return Program(folder_.path(), arguments).wait();
+  };
+  Said said = run({});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "12 frames of a video of 3.0 s")) << said.out;
+  EXPECT_TRUE(contains(said.out, "12 photos, 0 with GPS, 0 left out; 1 cameras, 1 flights")) << said.out;
+  EXPECT_TRUE(fs::exists(folder_ / "out/frames/frame_000011.jpg"));
+  said = run({});
+  EXPECT_TRUE(contains(said.out, "frames     finished before")) << said.out;
+  said = run({"--frames", "4"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "4 photos, 0 with GPS")) << said.out << "the others were of another number";
+  const std::string path = std::getenv("PATH");
+  ::setenv("PATH", "/nowhere", 1);
+  said = run({"--frames", "5"});
+  ::setenv("PATH", path.c_str(), 1);
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "apt-get install ffmpeg")) << said.err;
+}
+
+TEST_F(RunCommandLine, RefusesFramesOfAFolder) {
+  fs::create_directories(photos_);
+  const Said said = run({"--frames", "5"});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "--frames: concerns videos")) << said.err;
 }
 
 TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "apps/tessera/verbs.h"
+#include "photogrammetry/frame_choice.h"
 #include "pipeline/photo_run.h"
 #include "representations/methods.h"
 
@@ -33,12 +34,19 @@ TrainingCosts costsOf(const std::string& method) {
 void addRunVerb(CLI::App& app) {
   auto options = std::make_shared<PhotoRunOptions>();
   options->method = firstMethod(canBeBaked).name;
-  CLI::App* verb = app.add_subcommand("run", "a folder of photos to a scene: poses, training, baking, evaluation");
+  CLI::App* verb =
+      app.add_subcommand("run", "a folder of photos, or a video, to a scene: poses, training, baking, evaluation");
   verb->footer(
       "Run again with the same folders after an interruption: what is finished is kept.\n\n"
-      "Example:\n  tessera run photos/ place --minutes 10");
-  verb->add_option("photos", options->photos, "folder of photos (JPEG, PNG)")->required();
+      "Examples:\n  tessera run photos/ place --minutes 10\n  tessera run flight.mp4 place");
+  verb->add_option("photos", options->photos, "folder of photos (JPEG, PNG), or a video")->required();
   verb->add_option("out", options->out, "folder to write")->required();
+  verb->add_option("--frames", options->frames,
+                   fmt::format("frames to take from a video, the sharpest of as many intervals; 0: one for each {} s, "
+                               "but at most {}",
+                               kShortestInterval, kMaxDefaultFrames))
+      ->capture_default_str()
+      ->check(CLI::Range(0, 5000));
   verb->add_option("--method", options->method, "representation")
       ->capture_default_str()
       ->check(CLI::IsMember(bakedMethods()));

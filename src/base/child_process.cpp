@@ -49,6 +49,7 @@ std::string ChildProcess::start(std::vector<std::string> arguments, const ChildO
   Descriptor nothing;
   if (options.input < 0) nothing.reset(::open("/dev/null", O_RDONLY | O_CLOEXEC));
   const int input = options.input < 0 ? nothing.get() : options.input;
+  const int output = options.output < 0 ? messages_.get() : options.output;
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);
@@ -62,7 +63,7 @@ std::string ChildProcess::start(std::vector<std::string> arguments, const ChildO
     // Other threads do not exist here and may have held any lock: only system calls.
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     if (options.hasOwnGroup) ::setpgid(0, 0);
-    if (::getppid() == parent && ::dup2(input, STDIN_FILENO) >= 0 && ::dup2(messages_.get(), STDOUT_FILENO) >= 0 &&
+    if (::getppid() == parent && ::dup2(input, STDIN_FILENO) >= 0 && ::dup2(output, STDOUT_FILENO) >= 0 &&
         ::dup2(messages_.get(), STDERR_FILENO) >= 0) {
       ::execvp(pointers[0], pointers.data());
     }

@@ -30,8 +30,9 @@ class Descriptor {
 };
 
 struct ChildOptions {
-  int input = -1;  // a descriptor that it reads as its standard input; -1: it has none
-  fs::path log;    // a file to which its standard output and error output are appended; empty: they are kept in memory
+  int input = -1;   // a descriptor that it reads as its standard input; -1: it has none
+  fs::path log;     // a file to which its standard output and error output are appended; empty: they are kept in memory
+  int output = -1;  // a descriptor that its standard output is written to instead (output_pipe.h)
   bool hasOwnGroup = false;  // Ctrl-C on a terminal does not reach it; `interrupt` does
 };
 

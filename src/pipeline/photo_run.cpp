@@ -20,6 +20,7 @@
 #include "photogrammetry/photo_pairs.h"
 #include "pipeline/echoed_line.h"
 #include "pipeline/folder_lock.h"
+#include "pipeline/frames_stage.h"
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
 #include "pipeline/run_estimator.h"
@@ -63,25 +64,21 @@ ChosenPairs readPairs(const fs::path& file, size_t photos) {
 class PhotoRun {
  public:
   explicit PhotoRun(const PhotoRunOptions& options) : options_(options) {
-    ThreadPool pool(options.threads);
-    list_ = listPhotos(options.photos, pool);
-    warnLeftOut(list_.leftOut);
-    if (list_.photos.size() < 3) {
-      throw Error(options.photos.string(), "",
-                  fmt::format("holds {} photos that can be used; poses need three", list_.photos.size()),
-                  "name a folder of JPEG or PNG photos");
-    }
     const ColmapSettings colmap{.threads = options.threads};
     matches_ = std::make_unique<PhotoMatches>(out("poses"), list_, colmap);
     models_ = std::make_unique<PhotoModels>(out("poses"), list_, colmap);
-    estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, describePhotos(), downscale());
+    if (fs::is_regular_file(options.photos)) frames_.emplace(options_);
+    if (!frames_ || frames_->areComplete()) list();
   }
+
+  // Whether the photos are there, of which all but the frames of a video tells what it will take.
+  bool isListed() const { return !list_.photos.empty(); }
 
   std::vector<Stage> stages() {
     const std::string training =
         options_.steps > 0 ? fmt::format("--steps {}", options_.steps) : fmt::format("--minutes {}", options_.minutes);
-    return {
-        {.name = "inspect", .settings = describePhotos(), .run = [this](bool) { return inspect(); }},
+    std::vector<Stage> stages = {
+        {.name = "inspect", .settings = frames_ ? "" : describePhotos(), .run = [this](bool) { return inspect(); }},
         {.name = "features",
          .settings = "",
          .isComplete = has("poses/database.db"),
@@ -121,7 +118,7 @@ class PhotoRun {
          .isComplete = has("poses/georeference.json"),
          .run = [this](bool) { return georeferencing(); }},
         {.name = "capture",
-         .settings = fmt::format("{} {}", downscale(), describeHoldOut()),
+         .settings = fmt::format("{} {}", frames_ ? options_.downscale : downscale(), describeHoldOut()),
          .isComplete = has("capture/transforms.json"),
          .needs = [this](bool) { return estimator_->trainingNeeds().capture; },
          .run = [this](bool) { return capture(); }},
@@ -142,13 +139,41 @@ class PhotoRun {
          .needs = [this](bool) { return estimator_->trainingNeeds().evaluate; },
          .run = [this](bool) { return evaluate(); }},
         {.name = "report",
-         .settings = describeLeftOut(),
+         .settings = frames_ ? "" : describeLeftOut(),
          .isComplete = has("report.html"),
          .run = [this](bool) { return report(); }},
     };
+    if (frames_) addFrames(stages);
+    return stages;
   }
 
  private:
+  // Puts the stage `frames` before the others, whose photos, and settings that depend on them, follow from it.
+  void addFrames(std::vector<Stage>& stages) {
+    for (Stage& stage : stages)
+      stage.needs = [this, needs = stage.needs](bool resumes) { return isListed() ? needs(resumes) : StageNeeds{}; };
+    Stage frames = frames_->stage();
+    frames.run = [this, take = frames.run](bool resumes) {
+      const StageOutcome outcome = take(resumes);
+      list();
+      return outcome;
+    };
+    stages.insert(stages.begin(), std::move(frames));
+  }
+
+  void list() {
+    const fs::path folder = frames_ ? frames_->folder() : options_.photos;
+    ThreadPool pool(options_.threads);
+    list_ = listPhotos(folder, pool);
+    warnLeftOut(list_.leftOut);
+    if (list_.photos.size() < 3) {
+      throw Error(folder.string(), "",
+                  fmt::format("holds {} photos that can be used; poses need three", list_.photos.size()),
+                  "name a folder of JPEG or PNG photos, or a video");
+    }
+    estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, describePhotos(), downscale());
+  }
+
   fs::path out(const char* name) const { return options_.out / name; }
   std::function<bool()> has(const char* name) const {
     return [file = out(name)] {
@@ -411,7 +436,8 @@ class PhotoRun {
   }
 
   PhotoRunOptions options_;
-  PhotoList list_;
+  std::optional<VideoPhotos> frames_;  // of a video
+  PhotoList list_;                     // of a video: empty until its frames are there
   std::unique_ptr<PhotoMatches> matches_;
   std::unique_ptr<PhotoModels> models_;
   std::unique_ptr<RunEstimator> estimator_;
@@ -432,8 +458,11 @@ void announce(const RunPlan& plan, const fs::path& folder) {
 
 void runFromPhotos(const PhotoRunOptions& options) {
   std::error_code status;
-  if (!fs::is_directory(options.photos, status))
-    throw Error(options.photos.string(), "", "is not a folder", "name a folder of photos");
+  const bool isVideo = fs::is_regular_file(options.photos, status);
+  if (!isVideo && !fs::is_directory(options.photos, status))
+    throw Error(options.photos.string(), "", "is neither a folder nor a file", "name a folder of photos, or a video");
+  if (!isVideo && options.frames > 0)
+    throw Error("--frames", "", "concerns videos, and this is a folder", "leave it out, or name a video");
   const fs::path inside = fs::weakly_canonical(fs::absolute(options.out))
                               .lexically_relative(fs::weakly_canonical(fs::absolute(options.photos)));
   if (!inside.empty() && *inside.begin() != "..") {
@@ -441,7 +470,7 @@ void runFromPhotos(const PhotoRunOptions& options) {
                 "name another folder to write to");
   }
   checkHoldOut(options.holdout);
-  for (const char* name : {"poses", "capture", "model", "scene"}) {
+  for (const char* name : {"frames", "poses", "capture", "model", "scene"}) {
     if (!fs::exists(options.out / name, status) || fs::exists(options.out / "run.json", status)) continue;
     throw Error((options.out / name).string(), "", "was not made by such a run, and would be replaced",
                 "name another folder to write to");
@@ -449,6 +478,8 @@ void runFromPhotos(const PhotoRunOptions& options) {
   const FolderLock lock(options.out);
   PhotoRun run(options);
   const std::vector<Stage> stages = run.stages();
+  if (options.dryRun && !run.isListed())
+    throw Error("--dry-run", "", "the photos of this video are not there yet", "run with --until frames first");
   const RunPlan plan = planStages(options.out, stages, options.range);
   if (options.dryRun) fmt::print("{}", describePlan(plan));
   announce(plan, options.out);

@@ -1,6 +1,7 @@
-// From a folder of photos to a scene: the stages of `tessera run`.
+// From a folder of photos, or a video, to a scene: the stages of `tessera run`.
 //
 //   (plan)    how long features and matches take of a few photos     probe.json
+//   frames    of a video: its sharpest frames as photos              frames/
 //   inspect   which photos can be used; cameras, flights             run.json
 //   features  COLMAP's features                                      poses/database.db
 //   pairs     which photos are compared                              poses/pairs.json
@@ -24,7 +25,8 @@
 namespace tessera {
 
 struct PhotoRunOptions {
-  fs::path photos, out;
+  fs::path photos, out;  // `photos`: a folder, or a video
+  int frames = 0;        // of a video; 0: as many as suit it (photogrammetry/frame_choice.h)
   std::string method;
   double minutes = 10;  // of training
   int64_t steps = 0;    // instead of minutes, if above 0

@@ -175,6 +175,11 @@ int main(int count, char** arguments) {
   write("colmap_database/a", colmapDatabase());
   write("colmap_database/b",
         std::string("Querying for image p0 [1/3] in 0.1s\n  image_id=2, image_name=p1, score=0.1\n"));
+  write("video_list/a",
+        std::string(R"({"streams":[{"width":640,"height":360,"avg_frame_rate":"30000/1001","duration":"2.5",)"
+                    R"("nb_frames":"75"}],"format":{"duration":"2.6"}})"));
+  write("video_list/b", std::string("#tb 0: 1/1000\n0,  0,  0, 33, 4800, 0x26d968e4\n0, 33, 33, 33, 4800, 0x1\n"));
+  write("video_list/c", std::string("P6\n640 360\n255\n"));
   write("world/a",
         std::string(
             R"({"kind":"tessera world","version":2,"scenes":[{"url":"a"},{"url":"b","position":[1,2,3],"scale":2}],)"
