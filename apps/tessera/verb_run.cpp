@@ -39,7 +39,9 @@ void addRunVerb(CLI::App& app) {
   verb->footer(
       "Run again with the same folders after an interruption: what is finished is kept.\n\n"
       "Examples:\n  tessera run photos/ place --minutes 10\n  tessera run flight.mp4 place");
-  verb->add_option("photos", options->photos, "folder of photos (JPEG, PNG), or a video")->required();
+  verb->add_option("photos", options->photos,
+                   "folder of photos (JPEG, PNG), a video, or photos with poses as `import` reads them")
+      ->required();
   verb->add_option("out", options->out, "folder to write")->required();
   verb->add_option("--frames", options->frames,
                    fmt::format("frames to take from a video, the sharpest of as many intervals; 0: one for each {} s, "
@@ -61,7 +63,10 @@ void addRunVerb(CLI::App& app) {
           fmt::format("divides width and height; 0: until the longer side has at most {} pixels", kLongestSide))
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
-  verb->add_option("--holdout", options->holdout, "photos held out for evaluation: every:N, list:FILE or none")
+  verb->add_option(
+          "--holdout", options->holdout,
+          "photos held out for evaluation: every:N, list:FILE, none, or auto: the split of a source with poses, "
+          "else every:8")
       ->capture_default_str();
   verb->add_flag("--dry-run", options->dryRun,
                  "only state the time, memory and disk of each stage, after features and matches of five photos");

@@ -90,12 +90,6 @@ std::string shellWord(const fs::path& path) {
               "name the folder that holds one of them");
 }
 
-SourceCapture readSource(const fs::path& source) {
-  if (const auto files = findTransforms(source); !files.empty()) return readTransforms(files);
-  if (findColmapModel(source)) return readColmap(source);
-  refuse(source);
-}
-
 // Assigns unique paths in the capture: images/a.jpg and images/a.png, both downscaled to PNG, become a.png and
 // a.png.png.
 class Names {
@@ -306,6 +300,12 @@ std::string sourceFormat(const fs::path& source) {
   return "";
 }
 
+SourceCapture readSourceCapture(const fs::path& source) {
+  if (const auto files = findTransforms(source); !files.empty()) return readTransforms(files);
+  if (findColmapModel(source)) return readColmap(source);
+  refuse(source);
+}
+
 Capture importCapture(const fs::path& sourcePath, const fs::path& out, const ImportOptions& options) {
   if (options.downscale < 1 || options.downscale > 64) {
     throw Error("--downscale", std::to_string(options.downscale), "is not from 1 to 64", "use 1, 2, 4 or 8");
@@ -316,7 +316,7 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   }
   checkHoldOut(options.holdout);
   if (!options.maskCommand.empty()) MaskCommand{options.maskCommand};  // throws Error if it is malformed
-  return importSource(readSource(sourcePath), sourcePath.string(), out, options);
+  return importSource(readSourceCapture(sourcePath), sourcePath.string(), out, options);
 }
 
 Capture importSource(SourceCapture source, const std::string& from, const fs::path& out, const ImportOptions& options) {

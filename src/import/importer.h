@@ -42,6 +42,9 @@ Capture importCapture(const fs::path& source, const fs::path& out, const ImportO
 // check `options`.
 Capture importSource(SourceCapture source, const std::string& from, const fs::path& out, const ImportOptions& options);
 
+// Reads photos with poses in any supported format. Throws Error as importCapture.
+SourceCapture readSourceCapture(const fs::path& source);
+
 // Returns the format that a folder is recognised as: "COLMAP model", "transforms.json", ...; empty if no format
 // matches.
 std::string sourceFormat(const fs::path& source);

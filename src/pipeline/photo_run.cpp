@@ -23,47 +23,19 @@
 #include "pipeline/frames_stage.h"
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
+#include "pipeline/pairs_json.h"
+#include "pipeline/posed_source.h"
 #include "pipeline/run_estimator.h"
 #include "pipeline/run_report.h"
 
 namespace tessera {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-struct ChosenPairs {
-  std::vector<PhotoPair> pairs;
-  LookAlikes lookAlikes;
-};
-
-// Reads what the stage `pairs` has written. Throws Error if the file is damaged.
-ChosenPairs readPairs(const fs::path& file, size_t photos) {
-  const Json json = Json::parse(readTextFile(file), nullptr, false);
-  const Error damaged(file.string(), "", "does not describe pairs of these photos", "run again with --from pairs");
-  const auto isPhoto = [photos](const Json& number) {
-    return number.is_number_unsigned() && number.get<uint64_t>() < photos;
-  };
-  const auto isList = [&](const Json& list) {
-    return list.is_array() && std::all_of(list.begin(), list.end(), isPhoto);
-  };
-  const auto hasLists = [&](const char* key) {
-    return json.is_object() && json.contains(key) && json[key].is_array() &&
-           std::all_of(json[key].begin(), json[key].end(), isList);
-  };
-  if (!hasLists("pairs") || !hasLists("look_alikes")) throw damaged;
-  ChosenPairs chosen;
-  for (const Json& pair : json["pairs"]) {
-    if (pair.size() != 2 || pair[0] >= pair[1]) throw damaged;
-    chosen.pairs.emplace_back(pair[0].get<int>(), pair[1].get<int>());
-  }
-  chosen.lookAlikes = json["look_alikes"].get<LookAlikes>();
-  if (!chosen.lookAlikes.empty() && chosen.lookAlikes.size() != photos) throw damaged;
-  return chosen;
-}
-
 class PhotoRun {
  public:
-  explicit PhotoRun(const PhotoRunOptions& options) : options_(options) {
+  explicit PhotoRun(const PhotoRunOptions& options) : options_(options), posed_(PosedSource::open(options_)) {
+    if (posed_) return;
+    if (options_.holdout == "auto") options_.holdout = "every:8";
     const ColmapSettings colmap{.threads = options.threads};
     matches_ = std::make_unique<PhotoMatches>(out("poses"), list_, colmap);
     models_ = std::make_unique<PhotoModels>(out("poses"), list_, colmap);
@@ -72,7 +44,7 @@ class PhotoRun {
   }
 
   // Whether the photos are there, of which all but the frames of a video tells what it will take.
-  bool isListed() const { return !list_.photos.empty(); }
+  bool isListed() const { return posed_ || !list_.photos.empty(); }
 
   std::vector<Stage> stages() {
     const std::string training =
@@ -118,31 +90,34 @@ class PhotoRun {
          .isComplete = has("poses/georeference.json"),
          .run = [this](bool) { return georeferencing(); }},
         {.name = "capture",
-         .settings = fmt::format("{} {}", frames_ ? options_.downscale : downscale(), describeHoldOut()),
+         .settings = fmt::format("{} {}", frames_ ? options_.downscale : downscale(), describeHoldOut()) +
+                     (posed_ ? " " + posed_->digest() : ""),
          .isComplete = has("capture/transforms.json"),
-         .needs = [this](bool) { return estimator_->trainingNeeds().capture; },
+         .needs = [this](bool) { return trainingNeeds().capture; },
          .run = [this](bool) { return capture(); }},
         {.name = "train",
          .settings = fmt::format("--method {} {}", options_.method, training),
          .isComplete = has("model/manifest.json"),
          .discard = [this] { setModelAside(); },
-         .needs = [this](bool) { return estimator_->trainingNeeds().train; },
+         .needs = [this](bool) { return trainingNeeds().train; },
          .run = [this](bool) { return train(); }},
         {.name = "bake",
          .settings = "",
          .isComplete = has("scene/tileset.json"),
-         .needs = [this](bool) { return estimator_->trainingNeeds().bake; },
+         .needs = [this](bool) { return trainingNeeds().bake; },
          .run = [this](bool) { return bake(); }},
         {.name = "evaluate",
          .settings = "",
          .isComplete = [this] { return !hasHoldOut() || (has("eval.json")() && has("evaluation.html")()); },
-         .needs = [this](bool) { return estimator_->trainingNeeds().evaluate; },
+         .needs = [this](bool) { return trainingNeeds().evaluate; },
          .run = [this](bool) { return evaluate(); }},
         {.name = "report",
          .settings = frames_ ? "" : describeLeftOut(),
          .isComplete = has("report.html"),
          .run = [this](bool) { return report(); }},
     };
+    const auto isCapture = [](const Stage& stage) { return stage.name == "capture"; };
+    if (posed_) stages.erase(stages.begin(), std::find_if(stages.begin(), stages.end(), isCapture));
     if (frames_) addFrames(stages);
     return stages;
   }
@@ -211,7 +186,7 @@ class PhotoRun {
     return textDigest(text);
   }
 
-  bool hasHoldOut() const { return options_.holdout != "none"; }
+  bool hasHoldOut() const { return posed_ ? posed_->holdsOut() : options_.holdout != "none"; }
   // Of a list, also what it contains.
   std::string describeHoldOut() const {
     constexpr std::string_view kList = "list:";
@@ -245,11 +220,10 @@ class PhotoRun {
         warn("photos without GPS are only compared with those before and after them: {}", error.what());
       }
     }
-    const std::vector<PhotoPair> chosen = choosePairs(list_, lookAlikes);
-    const Json described = {{"pairs", chosen}, {"look_alikes", lookAlikes}};
-    writeFileAtomically(pairsFile(), described.dump());
+    const ChosenPairs chosen{choosePairs(list_, lookAlikes), lookAlikes};
+    writePairs(pairsFile(), chosen);
     return {matches_->takePeakBytes(),
-            fmt::format("{} of {}", chosen.size(), list_.photos.size() * (list_.photos.size() - 1) / 2)};
+            fmt::format("{} of {}", chosen.pairs.size(), list_.photos.size() * (list_.photos.size() - 1) / 2)};
   }
 
   StageOutcome matches() {
@@ -337,6 +311,7 @@ class PhotoRun {
 
   int downscale() const {
     if (options_.downscale > 0) return options_.downscale;
+    if (posed_) return (posed_->longerSide() + kLongestSide - 1) / kLongestSide;
     std::vector<int> sides;
     for (const ListedPhoto& photo : list_.photos) {
       const CameraBody& body = list_.bodies[static_cast<size_t>(photo.body)];
@@ -348,7 +323,7 @@ class PhotoRun {
 
   StageOutcome capture() {
     const Capture capture =
-        importSource(models_->read(), options_.photos.string(), out("capture"),
+        importSource(posed_ ? posed_->take(out("poses")) : models_->read(), options_.photos.string(), out("capture"),
                      {.downscale = downscale(), .holdout = options_.holdout, .threads = options_.threads});
     return {0, fmt::format("{} photos, {} held out{}", capture.photos.size(), capture.photosIn(Split::test).size(),
                            capture.geo ? ", georeferenced" : "")};
@@ -417,7 +392,7 @@ class PhotoRun {
     if (!hasHoldOut()) return {0, "no photo is held out"};
     StageOutcome outcome = runVerb("eval", {out("scene").string(), out("capture").string(), "--json",
                                             out("eval.json").string(), "--report", out("evaluation.html").string()});
-    const Json result = Json::parse(readTextFile(out("eval.json")));
+    const auto result = nlohmann::json::parse(readTextFile(out("eval.json")));
     outcome.summary = fmt::format("held-out PSNR {:.2f} dB", result.value("psnr", 0.0));
     return outcome;
   }
@@ -429,13 +404,16 @@ class PhotoRun {
     const fs::path folder = fs::absolute(options_.photos / "").lexically_normal().parent_path();
     writeFileAtomically(out("report.html"), runReport(options_.out, {.title = folder.filename().string(),
                                                                      .method = options_.method,
-                                                                     .photos = list_.photos,
+                                                                     .photos = posed_ ? posed_->photos() : list_.photos,
                                                                      .leftOut = list_.leftOut,
                                                                      .hasEvaluation = hasHoldOut()}));
     return {0, out("report.html").string()};
   }
 
+  TrainingNeeds trainingNeeds() { return posed_ ? posed_->trainingNeeds(downscale()) : estimator_->trainingNeeds(); }
+
   PhotoRunOptions options_;
+  std::optional<PosedSource> posed_;
   std::optional<VideoPhotos> frames_;  // of a video
   PhotoList list_;                     // of a video: empty until its frames are there
   std::unique_ptr<PhotoMatches> matches_;
@@ -458,10 +436,10 @@ void announce(const RunPlan& plan, const fs::path& folder) {
 
 void runFromPhotos(const PhotoRunOptions& options) {
   std::error_code status;
-  const bool isVideo = fs::is_regular_file(options.photos, status);
-  if (!isVideo && !fs::is_directory(options.photos, status))
+  const bool isFile = fs::is_regular_file(options.photos, status);
+  if (!isFile && !fs::is_directory(options.photos, status))
     throw Error(options.photos.string(), "", "is neither a folder nor a file", "name a folder of photos, or a video");
-  if (!isVideo && options.frames > 0)
+  if (!isFile && options.frames > 0)
     throw Error("--frames", "", "concerns videos, and this is a folder", "leave it out, or name a video");
   const fs::path inside = fs::weakly_canonical(fs::absolute(options.out))
                               .lexically_relative(fs::weakly_canonical(fs::absolute(options.photos)));

@@ -1,4 +1,5 @@
-// From a folder of photos, or a video, to a scene: the stages of `tessera run`.
+// From a folder of photos, or a video, to a scene: the stages of `tessera run`. Photos with poses, in a format that
+// `import` reads, begin at the stage `capture`.
 //
 //   (plan)    how long features and matches take of a few photos     probe.json
 //   frames    of a video: its sharpest frames as photos              frames/
@@ -25,17 +26,17 @@
 namespace tessera {
 
 struct PhotoRunOptions {
-  fs::path photos, out;  // `photos`: a folder, or a video
+  fs::path photos, out;  // `photos`: a folder, a video, or a source with poses
   int frames = 0;        // of a video; 0: as many as suit it (photogrammetry/frame_choice.h)
   std::string method;
-  double minutes = 10;  // of training
-  int64_t steps = 0;    // instead of minutes, if above 0
-  int downscale = 0;    // 0: so that the longer side of most photos has at most kLongestSide pixels
-  std::string holdout = "every:8";
-  int threads = 0;      // 0: all
-  std::string program;  // this program, which trains, bakes and evaluates
-  TrainingCosts costs;  // of `method`
-  bool dryRun = false;  // prints what the run will take, and ends
+  double minutes = 10;           // of training
+  int64_t steps = 0;             // instead of minutes, if above 0
+  int downscale = 0;             // 0: so that the longer side of most photos has at most kLongestSide pixels
+  std::string holdout = "auto";  // as for `import`; of photos without poses: every:8
+  int threads = 0;               // 0: all
+  std::string program;           // this program, which trains, bakes and evaluates
+  TrainingCosts costs;           // of `method`
+  bool dryRun = false;           // prints what the run will take, and ends
   StageRange range;
   std::function<bool()> interrupted = [] { return false; };  // asked for now and then; stops the run
 };

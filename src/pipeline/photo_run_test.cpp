@@ -1,0 +1,147 @@
+#include "pipeline/photo_run.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "base/error.h"
+#include "base/image_io.h"
+#include "base/testing/shared_data.h"
+#include "base/testing/temporary_folder.h"
+#include "pipeline/georeference_json.h"
+
+namespace tessera {
+namespace {
+
+class PhotoRuns : public testing::Test {
+ protected:
+  PhotoRuns() : path_(std::getenv("PATH")) {
+    // No program but the shell: what starts another one fails.
+    ::setenv("PATH", (folder_ / "bin").c_str(), 1);
+    options_.photos = folder_ / "photos";
+    options_.out = folder_ / "out";
+    options_.method = "volume";
+    options_.threads = 2;
+    options_.range.until = "capture";
+  }
+  ~PhotoRuns() override { ::setenv("PATH", path_.c_str(), 1); }
+
+  // Returns what a run prints, and the error that ends it.
+  std::string run() {
+    testing::internal::CaptureStdout();
+    testing::internal::CaptureStderr();
+    std::string failure;
+    try {
+      runFromPhotos(options_);
+    } catch (const Error& error) {
+      failure = error.what();
+    }
+    std::fflush(stdout);
+    const std::string said = testing::internal::GetCapturedStdout();
+    return said + testing::internal::GetCapturedStderr() + failure;
+  }
+
+  // Writes photos a0.png, a1.png, …, and their poses as transforms.json with `keys`.
+  void writePosed(int count, const std::string& keys = "") {
+    std::string frames;
+    for (int i = 0; i < count; ++i) {
+      const std::string name = "images/a" + std::to_string(i) + ".png";
+      writePng(options_.photos / name, ImageU8(16, 12, 3, static_cast<uint8_t>(20 * i)));
+      frames += std::string(i > 0 ? "," : "") + R"({"file_path":")" + name + R"(","transform_matrix":[[1,0,0,)" +
+                std::to_string(i) + R"(],[0,1,0,0],[0,0,1,0],[0,0,0,1]]})";
+    }
+    writeFileAtomically(options_.photos / "transforms.json", R"({"fl_x":14,"fl_y":14,"cx":8,"cy":6,"w":16,"h":12,)" +
+                                                                 keys + R"("frames":[)" + frames + "]}");
+  }
+
+  bool has(const std::string& file) const { return fs::exists(options_.out / file); }
+  static bool contains(const std::string& text, const std::string& part) { return text.find(part) != text.npos; }
+
+  TemporaryFolder folder_;
+  std::string path_;
+  PhotoRunOptions options_;
+};
+
+TEST_F(PhotoRuns, OfPosedPhotosBeginAtTheCapture) {
+  writePosed(9);
+  std::string said = run();
+  EXPECT_TRUE(contains(said, "has poses (transforms.json): the stages that find them are left out")) << said;
+  EXPECT_TRUE(contains(said, "9 photos, 2 held out")) << said;
+  EXPECT_FALSE(contains(said, "inspect")) << said;
+  EXPECT_FALSE(has("poses/database.db"));
+  EXPECT_EQ(probeImageFile(options_.out / "capture/images/a3.png").width, 16) << "small enough";
+  said = run();
+  EXPECT_TRUE(contains(said, "capture    finished before")) << said;
+  writePosed(8);
+  said = run();
+  EXPECT_TRUE(contains(said, "8 photos, 1 held out")) << said;
+  options_.range.from = "features";
+  EXPECT_TRUE(contains(run(), "name one of capture, train, bake, evaluate, report"));
+}
+
+TEST_F(PhotoRuns, OfPosedPhotosTakeTheFileOfPosesAlone) {
+  writePosed(3);
+  options_.photos /= "transforms.json";
+  EXPECT_TRUE(contains(run(), "3 photos, 1 held out"));
+}
+
+TEST_F(PhotoRuns, OfPosedPhotosReduceThemToASizeThatCanBeTrained) {
+  writePosed(3);
+  for (int i = 0; i < 3; ++i)
+    writePng(options_.photos / ("images/a" + std::to_string(i) + ".png"), ImageU8(1680, 1260, 3));
+  run();
+  EXPECT_EQ(probeImageFile(options_.out / "capture/images/a1.png").width, 840);
+}
+
+TEST_F(PhotoRuns, OfPosedPhotosUseTheSplitOfTheSource) {
+  writePosed(
+      4, R"("train_filenames":["images/a0.png","images/a1.png"],"test_filenames":["images/a2.png","images/a3.png"],)");
+  EXPECT_TRUE(contains(run(), "4 photos, 2 held out"));
+  options_.holdout = "every:4";
+  EXPECT_TRUE(contains(run(), "4 photos, 1 held out"));
+}
+
+TEST_F(PhotoRuns, OfPosedPhotosDoNotReplaceThem) {
+  options_.photos = options_.out / "capture";
+  writePosed(3);
+  writeFileAtomically(options_.out / "run.json", "{}");
+  EXPECT_TRUE(contains(run(), "is the capture that would be written"));
+}
+
+TEST_F(PhotoRuns, OfPhotosAloneFindTheirPoses) {
+  for (int i = 0; i < 3; ++i)
+    writeJpeg(options_.photos / ("images/" + std::to_string(i) + ".jpg"),
+              ImageU8(16, 12, 3, static_cast<uint8_t>(20 * i)));
+  // Neither of these is a model.
+  writeFileAtomically(options_.photos / "sparse/notes.txt", "of the flight");
+  writeFileAtomically(options_.photos / "cameras.txt", "1 PINHOLE 16 12 14 14 8 6");
+  writeFileAtomically(options_.photos / "track.json", "{}");
+  const std::string said = run();
+  EXPECT_FALSE(contains(said, "has poses")) << said;
+  EXPECT_TRUE(contains(said, "3 photos, 0 with GPS")) << said;
+  EXPECT_TRUE(contains(said, "apt-get install colmap")) << said;
+}
+
+TEST_F(PhotoRuns, OfRealPosedPhotosBeginAtTheCapture) {
+  SKIP_WITHOUT_SHARED_DATA("brighton_beach");
+  options_.photos = sharedData("brighton_beach");
+  options_.downscale = 16;
+  const std::string said = run();
+  EXPECT_TRUE(contains(said, "has poses (COLMAP model)")) << said;
+  EXPECT_TRUE(contains(said, "18 photos, 3 held out, georeferenced")) << said;
+  EXPECT_EQ(readGeoreference(options_.out / "poses/georeference.json").fixes, 18) << "for the report";
+  EXPECT_FALSE(has("poses/database.db"));
+}
+
+TEST_F(PhotoRuns, OfAVideoNeedFfmpeg) {
+  options_.photos = folder_ / "flight.mp4";
+  writeFileAtomically(options_.photos, "a video");
+  const std::string said = run();
+  EXPECT_TRUE(contains(said, "ffprobe: cannot be run")) << said;
+  EXPECT_TRUE(contains(said, "apt-get install ffmpeg")) << said;
+  options_.range.from = "dinner";
+  EXPECT_TRUE(contains(run(), "name one of frames, inspect, features")) << said;
+}
+
+}  // namespace
+}  // namespace tessera

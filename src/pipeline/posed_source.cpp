@@ -1,0 +1,127 @@
+#include "pipeline/posed_source.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "base/error.h"
+#include "base/image_io.h"
+#include "base/log.h"
+#include "base/order_statistics.h"
+#include "import/clean.h"
+#include "import/georeference.h"
+#include "import/holdout.h"
+#include "import/importer.h"
+#include "pipeline/georeference_json.h"
+#include "pipeline/left_out_json.h"
+
+namespace tessera {
+namespace {
+
+std::string describeFileTime(const fs::path& file) {
+  std::error_code status;
+  if (file.empty() || !fs::is_regular_file(file, status)) return "-";
+  return fmt::format("{} {}", fs::file_size(file, status),
+                     fs::last_write_time(file, status).time_since_epoch().count());
+}
+
+std::string describe(const Capture& capture) {
+  std::string text = fmt::format("{} points, {} observations\n", capture.points.size(), capture.observations.size());
+  for (const Camera& camera : capture.cameras) {
+    text += fmt::format("{} {}x{}", static_cast<int>(camera.lens), camera.width, camera.height);
+    for (const double parameter : camera.parameters) text += fmt::format(" {}", parameter);
+    text += "\n";
+  }
+  for (const Photo& photo : capture.photos) {
+    const Pose& pose = photo.worldFromCamera;
+    text += fmt::format("{} {} {} {} {}", photo.name, photo.camera, static_cast<int>(photo.split), photo.exposure,
+                        photo.depthUnit);
+    for (int i = 0; i < 3; ++i)
+      for (int k = 0; k < 3; ++k) text += fmt::format(" {}", pose.rotation(i, k));
+    for (int i = 0; i < 3; ++i) text += fmt::format(" {}", pose.translation[i]);
+    for (const fs::path& file : {photo.image, photo.mask, photo.depth}) text += " " + describeFileTime(file);
+    text += "\n";
+  }
+  Vec3d sum = Vec3d::Zero();
+  for (const SparsePoint& point : capture.points) sum += point.xInWorld;
+  return textDigest(text + fmt::format("{} {} {}", sum.x(), sum.y(), sum.z()));
+}
+
+int64_t countHeldOut(const SourceCapture& source, const std::string& rule) {
+  if (rule == "auto" && source.splitError) throw *source.splitError;
+  SourceCapture copy;
+  copy.capture.photos = source.capture.photos;
+  copy.hasOwnSplit = source.hasOwnSplit;
+  chooseSplit(copy, rule);
+  return static_cast<int64_t>(copy.capture.photosIn(Split::test).size());
+}
+
+}  // namespace
+
+std::optional<PosedSource> PosedSource::open(const PhotoRunOptions& options) {
+  const std::string format = sourceFormat(options.photos);
+  if (format.empty()) return std::nullopt;
+  if (fs::weakly_canonical(options.photos) == fs::weakly_canonical(options.out / "capture")) {
+    throw Error(options.photos.string(), "", "is the capture that would be written",
+                "name another folder to write to, or the photos that it was made from");
+  }
+  inform("{} has poses ({}): the stages that find them are left out", options.photos.string(), format);
+  return PosedSource(options);
+}
+
+PosedSource::PosedSource(const PhotoRunOptions& options)
+    : options_(&options), source_(readSourceCapture(options.photos)), digest_(describe(source_.capture)) {
+  const Capture& capture = source_.capture;
+  std::vector<int> sides;
+  std::vector<int64_t> pixels;
+  for (const Photo& photo : capture.photos) {
+    photos_.push_back({.name = photo.name, .file = photo.image});
+    std::error_code status;
+    const auto bytes = fs::file_size(photo.image, status);
+    size_.sourceBytes += status ? 0 : static_cast<int64_t>(bytes);
+    int width = 0, height = 0;
+    try {
+      const ImageInfo image = probeImageFile(photo.image);
+      width = image.width;
+      height = image.height;
+    } catch (const Error&) {  // it will be left out
+      if (static_cast<size_t>(photo.camera) >= capture.cameras.size()) continue;
+      width = capture.cameras[static_cast<size_t>(photo.camera)].width;
+      height = capture.cameras[static_cast<size_t>(photo.camera)].height;
+    }
+    sides.push_back(std::max(width, height));
+    pixels.push_back(int64_t{width} * height);
+  }
+  if (sides.empty()) throw Error(options.photos.string(), "", "no photo of it can be used", "see the warnings above");
+  longerSide_ = upperMedian(sides);
+  size_.photos = static_cast<int64_t>(photos_.size());
+  size_.sourcePixels = upperMedian(pixels);
+  size_.heldOut = countHeldOut(source_, options.holdout);
+}
+
+SourceCapture PosedSource::take(const fs::path& poses) {
+  ThreadPool pool(options_->threads);
+  std::set<std::string> missing;
+  for (const Photo& photo : source_.capture.photos) missing.insert(photo.name);
+  cleanSource(source_, pool);
+  for (const Photo& photo : source_.capture.photos) missing.erase(photo.name);
+  std::vector<LeftOutPhoto> leftOut;
+  for (const std::string& name : missing)
+    leftOut.push_back({name, "missing or unreadable, or of another shape than its camera"});
+  std::string reason;
+  const auto fit = georeference(source_.capture.photos, source_.flight, reason);
+  writeGeoreference(poses / "georeference.json", fit, reason, source_);
+  writeLeftOut(poses / "left_out.json", leftOut);
+  return std::move(source_);
+}
+
+TrainingNeeds PosedSource::trainingNeeds(int downscale) const {
+  TrainingSize size = size_;
+  size.photoPixels = size.sourcePixels / (int64_t{downscale} * downscale);
+  size.minutes = options_->minutes;
+  size.steps = options_->steps;
+  return planTraining(size, options_->costs);
+}
+
+}  // namespace tessera

@@ -1,0 +1,43 @@
+// Photos whose poses are known, of which `tessera run` leaves out the stages that find them.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "import/source.h"
+#include "photogrammetry/photo_list.h"
+#include "pipeline/photo_run.h"
+
+namespace tessera {
+
+class PosedSource {
+ public:
+  // Returns nothing if `import` recognises no format with poses; a plain folder of photos is none. `options` must
+  // outlive the result. Throws Error if the source cannot be read, or the rule of held-out photos does not fit it.
+  static std::optional<PosedSource> open(const PhotoRunOptions& options);
+
+  // Returns the source, once. In the folder `poses`, writes what the report says of poses: the photos that are left
+  // out, and the georeference.
+  SourceCapture take(const fs::path& poses);
+
+  // A digest of poses, cameras and points, and of the sizes and times of photos, masks and depth maps.
+  const std::string& digest() const { return digest_; }
+  const std::vector<ListedPhoto>& photos() const { return photos_; }  // names and files alone
+  // The longer side of the photo in the middle, in pixels: of its file, or of its camera where it cannot be read.
+  int longerSide() const { return longerSide_; }
+  bool holdsOut() const { return size_.heldOut > 0; }  // whether photos are held out to evaluate on
+  TrainingNeeds trainingNeeds(int downscale) const;
+
+ private:
+  explicit PosedSource(const PhotoRunOptions& options);
+
+  const PhotoRunOptions* options_;
+  SourceCapture source_;
+  std::string digest_;
+  std::vector<ListedPhoto> photos_;
+  TrainingSize size_;
+  int longerSide_ = 1;
+};
+
+}  // namespace tessera
