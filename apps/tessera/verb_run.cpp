@@ -19,7 +19,7 @@ std::vector<std::string> bakedMethods() {
   return names;
 }
 
-TrainingCosts costsOf(const std::string& method) {
+TrainingCosts typicalCosts(const std::string& method) {
   const MethodCosts costs = findMethod(method)->costs;
   return {.secondsPerStep = costs.secondsPerStep,
           .bakeSeconds = costs.bakeSeconds,
@@ -77,7 +77,7 @@ void addRunVerb(CLI::App& app) {
       ->check(CLI::Range(0, 1024));
   verb->callback([options] {
     options->program = fs::read_symlink("/proc/self/exe").string();
-    options->costs = costsOf(options->method);
+    options->costs = typicalCosts(options->method);
     options->interrupted = interrupted;
     catchInterrupts();
     try {

@@ -20,7 +20,7 @@ constexpr int kLookedAtSide = 640;  // pixels of the longer side: motion that bl
 constexpr int kJpegQuality = 95;
 constexpr const char* kInstall = "install it: apt-get install ffmpeg";
 
-std::string lastLineOf(const ChildProcess& process) {
+std::string lastLine(const ChildProcess& process) {
   const std::string words = process.lastWords();
   return words.substr(words.rfind('\n') == words.npos ? 0 : words.rfind('\n') + 1);
 }
@@ -88,17 +88,17 @@ struct VideoFrames::Decoding {
     const std::string end = process.wait();
     peakBytes = std::max(peakBytes, process.peakBytes());
     if (!end.empty()) {
-      throw Error(video.string(), "", fmt::format("{} {}: {}", program, end, lastLineOf(process)),
+      throw Error(video.string(), "", fmt::format("{} {}: {}", program, end, lastLine(process)),
                   "check that the video plays, and the free space; run again to go on");
     }
-    return lastLineOf(process);
+    return lastLine(process);
   }
 };
 
 VideoFrames::VideoFrames(fs::path video, fs::path folder, VideoFrameOptions options)
     : video_(std::move(video)), folder_(std::move(folder)), options_(std::move(options)) {}
 
-std::string VideoFrames::fileOf(int64_t frame) const {
+std::string VideoFrames::frameFile(int64_t frame) const {
   return (folder_ / fmt::format("frame_{:06}.jpg", frame)).string();
 }
 
@@ -135,8 +135,8 @@ VideoStream VideoFrames::inspect(const Watch& watch) {
   const std::string end = process.wait();
   const char* remedy = "name a video that plays, or a folder of photos";
   if (!end.empty()) {
-    throw Error(video_.string(), "",
-                fmt::format("is no video that {} can read: {}", options_.probe, lastLineOf(process)), remedy);
+    throw Error(video_.string(), "", fmt::format("is no video that {} can read: {}", options_.probe, lastLine(process)),
+                remedy);
   }
   const auto stream = parseVideoStream(text);
   if (!stream) throw Error(video_.string(), "", "has no video stream", remedy);
@@ -211,7 +211,7 @@ void VideoFrames::extract(const Watch& watch) {
   std::vector<int64_t> missing;
   std::error_code status;
   std::copy_if(chosen.begin(), chosen.end(), std::back_inserter(missing),
-               [&](int64_t frame) { return !fs::exists(fileOf(frame), status); });
+               [&](int64_t frame) { return !fs::exists(frameFile(frame), status); });
   if (missing.empty()) return;
   // The numbers count what leaves the first filter, as in `choose`.
   std::string selection;
@@ -227,7 +227,7 @@ void VideoFrames::extract(const Watch& watch) {
   size_t done = 0;
   const auto look = [&] { watch(static_cast<int64_t>(chosen.size() - missing.size() + done)); };
   for (; done < missing.size() && decoding.next(picture, look); ++done)
-    writeJpeg(fileOf(missing[done]), picture, kJpegQuality);
+    writeJpeg(frameFile(missing[done]), picture, kJpegQuality);
   const std::string complaint = decoding.finish(peakBytes_);
   if (done == missing.size()) return;
   throw Error(video_.string(), "", fmt::format("{} of {} frames could be decoded: {}", done, missing.size(), complaint),
@@ -238,7 +238,7 @@ bool VideoFrames::isComplete() const {
   const std::vector<int64_t> chosen = readChosen(listFile(), origin());
   std::error_code status;
   return !chosen.empty() &&
-         std::all_of(chosen.begin(), chosen.end(), [&](int64_t frame) { return fs::exists(fileOf(frame), status); });
+         std::all_of(chosen.begin(), chosen.end(), [&](int64_t frame) { return fs::exists(frameFile(frame), status); });
 }
 
 void VideoFrames::discard() const {

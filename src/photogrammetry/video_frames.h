@@ -49,7 +49,7 @@ class VideoFrames {
  private:
   struct Decoding;
   fs::path listFile() const { return folder_ / "frames.json"; }
-  std::string fileOf(int64_t frame) const;
+  std::string frameFile(int64_t frame) const;
   std::vector<std::string> command(const std::string& program) const;
 
   fs::path video_, folder_;

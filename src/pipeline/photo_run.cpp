@@ -393,7 +393,10 @@ class PhotoRun {
     StageOutcome outcome = runVerb("eval", {out("scene").string(), out("capture").string(), "--json",
                                             out("eval.json").string(), "--report", out("evaluation.html").string()});
     const auto result = nlohmann::json::parse(readTextFile(out("eval.json")));
-    outcome.summary = fmt::format("held-out PSNR {:.2f} dB", result.value("psnr", 0.0));
+    // It has none if the views show nothing that is compared.
+    outcome.summary = result.is_object() && result.contains("psnr") && result["psnr"].is_number()
+                          ? fmt::format("held-out PSNR {:.2f} dB", result["psnr"].get<double>())
+                          : "no held-out PSNR: the views show nothing that is compared";
     return outcome;
   }
 

@@ -130,7 +130,7 @@ Remaining findRemaining(const fs::path& folder, const std::vector<Stage>& stages
   return remaining;
 }
 
-RunPlan planOf(const std::vector<Stage>& stages, const Remaining& remaining) {
+RunPlan planRemaining(const std::vector<Stage>& stages, const Remaining& remaining) {
   RunPlan plan;
   for (size_t i = remaining.first; i < remaining.end; ++i)
     plan.entries.push_back({stages[i].name, stages[i].needs(i == remaining.first && remaining.resumes)});
@@ -171,7 +171,7 @@ std::string textDigest(const std::string& text) {
 }
 
 RunPlan planStages(const fs::path& folder, const std::vector<Stage>& stages, const StageRange& range) {
-  return planOf(stages, findRemaining(folder, stages, range));
+  return planRemaining(stages, findRemaining(folder, stages, range));
 }
 
 void runStages(const fs::path& folder, const std::string& request, const std::vector<Stage>& stages,
@@ -180,7 +180,7 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
   const fs::path file = folder / kRecord;
   Json run = {{"version", 1}, {"request", request}, {"stages", Json::array()}};
   if (!range.from.empty()) run["begun_from"] = range.from;
-  const StageNeeds total = planOf(stages, remaining).total();
+  const StageNeeds total = planRemaining(stages, remaining).total();
   run["expected"] = {{"seconds", total.seconds}, {"peak_bytes", total.memoryBytes}, {"disk_bytes", total.diskBytes}};
   for (size_t i = 0; i < remaining.first; ++i) {
     fmt::print("{:<10} finished before: {}\n", stages[i].name, remaining.known[i].summary);
