@@ -119,11 +119,16 @@ TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {
     fs::copy_file(sharedData("brighton_beach") / "images" / ("DJI_00" + std::to_string(18 + i) + ".JPG"),
                   photos_ / names[i]);
   }
-  const std::vector<std::string> flags = {"--until", "capture", "--downscale", "8", "--holdout", "none"};
+  ImageU8 mask(1600, 900, 1, 255);
+  std::fill_n(mask.pixels.begin(), 1600 * 200, uint8_t{0});
+  writePng(folder_ / "masks/a b/DJI 0019.JPG.png", mask);
+  const std::vector<std::string> flags = {"--until",   "capture", "--downscale", "8",
+                                          "--holdout", "none",    "--masks",     (folder_ / "masks").string()};
   Said said = run(flags);
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_TRUE(contains(said.out, "4 photos, 0 held out")) << said.out;
   EXPECT_TRUE(fs::exists(folder_ / "out/capture/images/a b/DJI_0018.png"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/capture/masks/a b/DJI 0019.png"));
   const auto timeOfModel = fs::last_write_time(folder_ / "out/poses/sparse/0/images.bin");
   said = run(flags);
   EXPECT_EQ(said.exitCode, 0) << said.err;

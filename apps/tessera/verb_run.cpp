@@ -49,6 +49,8 @@ void addRunVerb(CLI::App& app) {
                                kShortestInterval, kMaxDefaultFrames))
       ->capture_default_str()
       ->check(CLI::Range(0, 5000));
+  verb->add_option("--masks", options->masks,
+                   "folder of masks, black where a photo a/b.jpg is not to be used: a/b.jpg.png, a/b.jpg or a/b.png");
   verb->add_option("--method", options->method, "representation")
       ->capture_default_str()
       ->check(CLI::IsMember(bakedMethods()));

@@ -52,18 +52,6 @@ std::optional<Pose> decodePose(const ColmapModel::Image& image) {
   return Pose{rotation.toRotationMatrix(), t}.inverse();
 }
 
-// Finds the mask of images/a/b.jpg: masks/a/b.jpg.png (COLMAP's convention), masks/a/b.jpg or masks/a/b.png.
-fs::path findMask(const fs::path& maskFolder, const std::string& name) {
-  std::error_code status;
-  if (!fs::is_directory(maskFolder, status)) return {};
-  for (const std::string& candidate :
-       {name + ".png", name, fs::path(name).replace_extension(".png").generic_string()}) {
-    const auto path = resolveInside(maskFolder, candidate);
-    if (path && fs::is_regular_file(*path, status)) return *path;
-  }
-  return {};
-}
-
 bool isModelFolder(const fs::path& folder) {
   std::error_code status;
   for (const char* extension : {".bin", ".txt"}) {
@@ -85,6 +73,17 @@ fs::path findImages(const fs::path& source, const fs::path& model) {
 }
 
 }  // namespace
+
+fs::path findMask(const fs::path& maskFolder, const std::string& name) {
+  std::error_code status;
+  if (!fs::is_directory(maskFolder, status)) return {};
+  for (const std::string& candidate :
+       {name + ".png", name, fs::path(name).replace_extension(".png").generic_string()}) {
+    const auto path = resolveInside(maskFolder, candidate);
+    if (path && fs::is_regular_file(*path, status)) return *path;
+  }
+  return {};
+}
 
 int colmapParameterCount(int model) {
   if (model == kSimpleFisheye) return 3;

@@ -61,6 +61,10 @@ bool isColmapLens(std::string_view model);       // whether colmapCamera support
 // implausibly far away, or whose name leaves the folder, with a warning.
 SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder);
 
+// Returns the mask of the photo a/b.jpg in a folder of masks: a/b.jpg.png (COLMAP's convention), a/b.jpg or a/b.png;
+// an empty path if there is none.
+fs::path findMask(const fs::path& maskFolder, const std::string& name);
+
 // Returns the folder of the sparse model in a source folder (sparse/0, sparse, colmap/sparse/0, or the folder itself;
 // the largest of several numbered ones, with a warning), or nothing if it has none.
 std::optional<fs::path> findColmapModel(const fs::path& source);

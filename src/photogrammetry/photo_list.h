@@ -25,6 +25,7 @@ struct ListedPhoto {
   int body = 0;    // index into PhotoList::bodies
   int flight = 0;  // photos of one body without a long pause between them, or in one folder if times are unknown
   PhotoTags tags;
+  fs::path mask = {};  // black where the photo is not used (photo_masks.h); empty: none
 };
 
 struct LeftOutPhoto {

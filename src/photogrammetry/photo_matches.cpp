@@ -11,6 +11,7 @@
 #include "base/memory.h"
 #include "photogrammetry/colmap_database.h"
 #include "photogrammetry/look_alikes.h"
+#include "photogrammetry/photo_masks.h"
 
 namespace tessera {
 namespace {
@@ -62,7 +63,7 @@ void PhotoMatches::runColmap(const char* step, std::vector<std::string> argument
 
 void PhotoMatches::discard() const {
   // The log of the database goes first: it would be replayed into a new one.
-  for (const char* name : {"database.db-wal", "database.db-shm", "database.db", "images", "words.bin"}) {
+  for (const char* name : {"database.db-wal", "database.db-shm", "database.db", "images", "masks", "words.bin"}) {
     std::error_code status;
     fs::remove_all(folder_ / name, status);
     if (status) throw Error((folder_ / name).string(), "", "cannot be removed: " + status.message(), "remove it");
@@ -94,11 +95,18 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
     int64_t pixels = 0;
     for (const CameraBody& body : list_.bodies) pixels = std::max(pixels, int64_t{body.width} * body.height);
     const int threads = extractionThreads(settings_.threads, pixels, usableMemoryBytes());
-    runColmap(
-        "features",
-        {"feature_extractor", "--database_path", database().string(), "--image_path", (folder_ / "images").string(),
-         "--SiftExtraction.use_gpu", "0", "--SiftExtraction.num_threads", std::to_string(threads)},
-        [&] { watch(done()); });
+    std::vector<std::string> arguments{"feature_extractor",
+                                       "--database_path",
+                                       database().string(),
+                                       "--image_path",
+                                       (folder_ / "images").string(),
+                                       "--SiftExtraction.use_gpu",
+                                       "0",
+                                       "--SiftExtraction.num_threads",
+                                       std::to_string(threads)};
+    if (writeMasks(list_, folder_ / "masks"))
+      arguments.insert(arguments.end(), {"--ImageReader.mask_path", (folder_ / "masks").string()});
+    runColmap("features", std::move(arguments), [&] { watch(done()); });
   }
   int64_t features = 0;
   for (const auto& [photo, number] : ColmapDatabase(database()).features()) features += number;

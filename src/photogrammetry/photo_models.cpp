@@ -485,6 +485,7 @@ SourceCapture PhotoModels::readFrom(const fs::path& model) const {
     photo.name = listed->second->name;
     photo.image = fs::absolute(listed->second->file);
     photo.gps = listed->second->tags.gps;
+    photo.mask = listed->second->mask;
     source.flight[static_cast<size_t>(&photo - source.capture.photos.data())] = listed->second->flight;
   }
   return source;

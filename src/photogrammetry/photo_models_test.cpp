@@ -48,6 +48,14 @@ TEST_F(PhotoModelsTest, AreRefusedIfTheySeeHardlyAnyPoint) {
   EXPECT_NE(message.find("taken from different places"), std::string::npos) << message;
 }
 
+TEST_F(PhotoModelsTest, HaveTheMasksOfTheirPhotos) {
+  list_.photos[1].mask = "/masks/p1.png";
+  PhotoModels estimated = models("cp -r " + prepared("a", numbers(0, 3)) + " $output_path/0");
+  estimated.map(false, ignore);
+  for (const Photo& photo : estimated.read().capture.photos)
+    EXPECT_EQ(photo.mask, photo.name == "p1.jpg" ? "/masks/p1.png" : "") << photo.name;
+}
+
 // The mapper makes no second model unless it is asked for one of the other photos.
 TEST_F(PhotoModelsTest, IncludeThoseOfPhotosThatTheFirstLacks) {
   PhotoModels estimated =

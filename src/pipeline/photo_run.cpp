@@ -15,6 +15,7 @@
 #include "import/holdout.h"
 #include "import/importer.h"
 #include "photogrammetry/photo_list.h"
+#include "photogrammetry/photo_masks.h"
 #include "photogrammetry/photo_matches.h"
 #include "photogrammetry/photo_models.h"
 #include "photogrammetry/photo_pairs.h"
@@ -31,10 +32,21 @@
 namespace tessera {
 namespace {
 
+bool liesIn(const fs::path& path, const fs::path& folder) {
+  const fs::path inside =
+      fs::weakly_canonical(fs::absolute(path)).lexically_relative(fs::weakly_canonical(fs::absolute(folder)));
+  return !inside.empty() && *inside.begin() != "..";
+}
+
 class PhotoRun {
  public:
   explicit PhotoRun(const PhotoRunOptions& options) : options_(options), posed_(PosedSource::open(options_)) {
     if (posed_) return;
+    if (!options_.masks.empty()) masks_.emplace(options_.masks);
+    if (masks_ && liesIn(options_.masks, options_.photos)) {
+      throw Error("--masks " + options_.masks.string(), "",
+                  "is in the folder of photos: masks would be taken for photos", "move it elsewhere");
+    }
     if (options_.holdout == "auto") options_.holdout = "every:8";
     const ColmapSettings colmap{.threads = options.threads};
     matches_ = std::make_unique<PhotoMatches>(out("poses"), list_, colmap);
@@ -52,7 +64,7 @@ class PhotoRun {
     std::vector<Stage> stages = {
         {.name = "inspect", .settings = frames_ ? "" : describePhotos(), .run = [this](bool) { return inspect(); }},
         {.name = "features",
-         .settings = "",
+         .settings = masks_ ? textDigest(masks_->describe()) : "",
          .isComplete = has("poses/database.db"),
          .discard = [this] { matches_->discard(); },
          .needs = [this](bool resumes) { return estimator_->featureNeeds(resumes); },
@@ -146,6 +158,7 @@ class PhotoRun {
                   fmt::format("holds {} photos that can be used; poses need three", list_.photos.size()),
                   "name a folder of JPEG or PNG photos, or a video");
     }
+    if (masks_) masks_->addTo(list_);
     estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, describePhotos(), downscale());
   }
 
@@ -417,6 +430,7 @@ class PhotoRun {
 
   PhotoRunOptions options_;
   std::optional<PosedSource> posed_;
+  std::optional<PhotoMasks> masks_;    // of photos without poses
   std::optional<VideoPhotos> frames_;  // of a video
   PhotoList list_;                     // of a video: empty until its frames are there
   std::unique_ptr<PhotoMatches> matches_;
@@ -444,9 +458,7 @@ void runFromPhotos(const PhotoRunOptions& options) {
     throw Error(options.photos.string(), "", "is neither a folder nor a file", "name a folder of photos, or a video");
   if (!isFile && options.frames > 0)
     throw Error("--frames", "", "concerns videos, and this is a folder", "leave it out, or name a video");
-  const fs::path inside = fs::weakly_canonical(fs::absolute(options.out))
-                              .lexically_relative(fs::weakly_canonical(fs::absolute(options.photos)));
-  if (!inside.empty() && *inside.begin() != "..") {
+  if (liesIn(options.out, options.photos)) {
     throw Error(options.out.string(), "", "is the folder of photos, or in it: its pictures would be taken for photos",
                 "name another folder to write to");
   }

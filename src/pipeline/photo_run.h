@@ -28,6 +28,7 @@ namespace tessera {
 struct PhotoRunOptions {
   fs::path photos, out;  // `photos`: a folder, a video, or a source with poses
   int frames = 0;        // of a video; 0: as many as suit it (photogrammetry/frame_choice.h)
+  fs::path masks;        // a folder, as for PhotoMasks; empty: photos have no masks, or those of their source
   std::string method;
   double minutes = 10;           // of training
   int64_t steps = 0;             // instead of minutes, if above 0

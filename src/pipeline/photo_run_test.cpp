@@ -101,6 +101,31 @@ TEST_F(PhotoRuns, OfPosedPhotosUseTheSplitOfTheSource) {
   EXPECT_TRUE(contains(run(), "4 photos, 1 held out"));
 }
 
+TEST_F(PhotoRuns, PutMasksIntoTheCapture) {
+  writePosed(3);
+  options_.masks = folder_ / "masks";
+  EXPECT_TRUE(contains(run(), "masks: is not a folder"));
+  ImageU8 mask(16, 12, 1, 255);
+  mask.at(3, 4)[0] = 0;
+  writePng(options_.masks / "a1.png", mask);
+  std::string said = run();
+  EXPECT_TRUE(contains(said, "1 of 3 photos have masks")) << said;
+  EXPECT_EQ(readImage(options_.out / "capture/masks/a1.png").image.pixels, mask.pixels);
+  EXPECT_FALSE(has("capture/masks/a0.png"));
+  EXPECT_TRUE(contains(run(), "capture    finished before"));
+  mask.at(5, 6)[0] = 0;
+  writePng(options_.masks / "a1.png", mask);
+  said = run();
+  EXPECT_FALSE(contains(said, "capture    finished before")) << "masks have changed";
+  EXPECT_EQ(readImage(options_.out / "capture/masks/a1.png").image.pixels, mask.pixels);
+}
+
+TEST_F(PhotoRuns, RefuseMasksAmongPhotos) {
+  writeJpeg(options_.photos / "masks/a.jpg", ImageU8(8, 8, 1));
+  options_.masks = options_.photos / "masks";
+  EXPECT_TRUE(contains(run(), "masks would be taken for photos"));
+}
+
 TEST_F(PhotoRuns, OfPosedPhotosDoNotReplaceThem) {
   options_.photos = options_.out / "capture";
   writePosed(3);

@@ -13,6 +13,7 @@
 #include "import/georeference.h"
 #include "import/holdout.h"
 #include "import/importer.h"
+#include "photogrammetry/photo_masks.h"
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
 
@@ -62,6 +63,7 @@ int64_t countHeldOut(const SourceCapture& source, const std::string& rule) {
 std::optional<PosedSource> PosedSource::open(const PhotoRunOptions& options) {
   const std::string format = sourceFormat(options.photos);
   if (format.empty()) return std::nullopt;
+  if (options.frames > 0) throw Error("--frames", "", "concerns videos, and this is none", "leave it out");
   if (fs::weakly_canonical(options.photos) == fs::weakly_canonical(options.out / "capture")) {
     throw Error(options.photos.string(), "", "is the capture that would be written",
                 "name another folder to write to, or the photos that it was made from");
@@ -71,8 +73,10 @@ std::optional<PosedSource> PosedSource::open(const PhotoRunOptions& options) {
 }
 
 PosedSource::PosedSource(const PhotoRunOptions& options)
-    : options_(&options), source_(readSourceCapture(options.photos)), digest_(describe(source_.capture)) {
+    : options_(&options), source_(readSourceCapture(options.photos)) {
+  if (!options.masks.empty()) PhotoMasks(options.masks).addTo(source_);
   const Capture& capture = source_.capture;
+  digest_ = describe(capture);
   std::vector<int> sides;
   std::vector<int64_t> pixels;
   for (const Photo& photo : capture.photos) {

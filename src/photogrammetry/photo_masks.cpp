@@ -1,0 +1,130 @@
+#include "photogrammetry/photo_masks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <optional>
+
+#include "base/error.h"
+#include "base/image_io.h"
+#include "base/log.h"
+#include "import/colmap_model.h"
+#include "import/photo_files.h"
+
+namespace tessera {
+namespace {
+
+constexpr const char* kImages = "images/";
+
+std::string withoutImages(const std::string& name) {
+  return name.starts_with(kImages) ? name.substr(std::string_view(kImages).size()) : name;
+}
+
+std::optional<ImageInfo> probe(const fs::path& file) {
+  try {
+    return probeImageFile(file);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+void checkSize(const fs::path& mask, const std::string& name, int width, int height) {
+  const auto size = probe(mask);
+  if (!size) throw Error(mask.string(), "", "cannot be read as PNG or JPEG", "write this mask again, or remove it");
+  if (size->width == width && size->height == height) return;
+  throw Error(mask.string(), "",
+              fmt::format("is {} x {} pixels large, and its photo {} is {} x {}", size->width, size->height, name,
+                          width, height),
+              "give it the size of the photo");
+}
+
+}  // namespace
+
+PhotoMasks::PhotoMasks(fs::path folder) : folder_(std::move(folder)) {
+  std::error_code status;
+  if (!fs::is_directory(folder_, status))
+    throw Error("--masks " + folder_.string(), "", "is not a folder", "name the folder of masks");
+}
+
+std::string PhotoMasks::describe() const {
+  std::vector<std::string> lines;
+  std::error_code status;
+  fs::recursive_directory_iterator at(folder_, status), end;
+  for (; !status && at != end; at.increment(status)) {
+    std::error_code ignored;
+    if (!at->is_regular_file(ignored)) continue;
+    lines.push_back(fmt::format("{} {} {}\n", at->path().lexically_relative(folder_).generic_string(),
+                                at->file_size(ignored), at->last_write_time(ignored).time_since_epoch().count()));
+  }
+  if (status) throw Error(folder_.string(), "", "cannot be listed: " + status.message(), "make it readable");
+  std::sort(lines.begin(), lines.end());
+  std::string text;
+  for (const std::string& line : lines) text += line;
+  return text;
+}
+
+fs::path PhotoMasks::find(const std::string& name, const fs::path& photo) const {
+  const fs::path mask = findMask(folder_, name);
+  std::error_code status;
+  return !mask.empty() && fs::equivalent(mask, photo, status) ? fs::path() : mask;
+}
+
+void PhotoMasks::report(size_t masks, const std::vector<std::string>& photos) const {
+  if (masks == 0 && !photos.empty()) {
+    const std::string name = withoutImages(photos.front());
+    throw Error("--masks " + folder_.string(), "",
+                fmt::format("has no mask of any photo: for {}, neither {}.png nor {} nor {} is there", photos.front(),
+                            name, name, fs::path(name).replace_extension(".png").generic_string()),
+                "name the masks like the photos");
+  }
+  inform("{} of {} photos have masks", masks, photos.size());
+}
+
+void PhotoMasks::addTo(PhotoList& list) const {
+  size_t masks = 0;
+  std::vector<std::string> names;
+  for (ListedPhoto& photo : list.photos) {
+    names.push_back(photo.name);
+    photo.mask = find(photo.name, photo.file);
+    if (photo.mask.empty()) continue;
+    const CameraBody& body = list.bodies[static_cast<size_t>(photo.body)];
+    checkSize(photo.mask, photo.name, body.width, body.height);
+    ++masks;
+  }
+  report(masks, names);
+}
+
+void PhotoMasks::addTo(SourceCapture& source) const {
+  size_t masks = 0;
+  std::vector<std::string> names;
+  std::vector<Photo>& photos = source.capture.photos;
+  source.maskIsInverted.resize(photos.size(), false);
+  for (size_t i = 0; i < photos.size(); ++i) {
+    Photo& photo = photos[i];
+    names.push_back(photo.name);
+    fs::path mask = find(photo.name, photo.image);
+    if (mask.empty()) mask = find(withoutImages(photo.name), photo.image);
+    if (mask.empty()) continue;
+    const auto size = probe(photo.image);
+    if (!size) continue;  // it is dropped at import
+    checkSize(mask, photo.name, size->width, size->height);
+    photo.mask = mask;
+    source.maskIsInverted[i] = false;
+    ++masks;
+  }
+  report(masks, names);
+}
+
+bool writeMasks(const PhotoList& list, const fs::path& folder) {
+  bool areThere = false;
+  for (const ListedPhoto& photo : list.photos) {
+    if (photo.mask.empty()) continue;
+    areThere = true;
+    const fs::path target = folder / (photo.safeName + ".png");
+    std::error_code status;
+    if (!fs::exists(target, status)) writePng(target, toMask(readImage(photo.mask).image, false));
+  }
+  return areThere;
+}
+
+}  // namespace tessera
