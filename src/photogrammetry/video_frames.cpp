@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <span>
 
 #include "base/child_process.h"
 #include "base/error.h"
@@ -18,6 +19,7 @@ namespace {
 constexpr size_t kFewestFramesOfVideo = 3;
 constexpr int kLookedAtSide = 640;  // pixels of the longer side: motion that blurs more than one of them counts
 constexpr int kJpegQuality = 95;
+constexpr size_t kFramesAtOnce = 2000;  // an argument of a program has at most 128 KiB
 constexpr const char* kInstall = "install it: apt-get install ffmpeg";
 
 std::string lastLine(const ChildProcess& process) {
@@ -40,6 +42,15 @@ std::vector<int64_t> readChosen(const fs::path& file, const std::string& origin)
     if (numbers.size() > 1 && numbers.back() <= numbers[numbers.size() - 2]) return {};
   }
   return numbers;
+}
+
+// Returns an expression of ffmpeg that is 1 for these frames, in ascending order, and 0 for others. It is a tree: a sum
+// of more than about a hundred terms is refused.
+std::string selectFrames(std::span<const int64_t> frames) {
+  if (frames.size() == 1) return fmt::format("eq(n,{})", frames[0]);
+  const size_t middle = frames.size() / 2;
+  return fmt::format("if(lt(n,{}),{},{})", frames[middle], selectFrames(frames.first(middle)),
+                     selectFrames(frames.subspan(middle)));
 }
 
 }  // namespace
@@ -212,26 +223,27 @@ void VideoFrames::extract(const Watch& watch) {
   std::error_code status;
   std::copy_if(chosen.begin(), chosen.end(), std::back_inserter(missing),
                [&](int64_t frame) { return !fs::exists(frameFile(frame), status); });
-  if (missing.empty()) return;
-  // The numbers count what leaves the first filter, as in `choose`.
-  std::string selection;
-  for (const int64_t frame : missing) selection += fmt::format("{}eq(n,{})", selection.empty() ? "" : "+", frame);
-  std::vector<std::string> arguments = command(options_.program);
-  arguments.insert(
-      arguments.end(),
-      {"-map", "0:V:0", "-vf", fmt::format("yadif=deint=interlaced,select='{}',scale=iw*sar:ih,setsar=1", selection),
-       "-fps_mode", "passthrough", "-frames:v", std::to_string(missing.size()), "-pix_fmt", "rgb24", "-c:v", "ppm",
-       "-f", "image2pipe", "pipe:1"});
-  Decoding decoding(std::move(arguments), video_);
-  ImageU8 picture;
   size_t done = 0;
   const auto look = [&] { watch(static_cast<int64_t>(chosen.size() - missing.size() + done)); };
-  for (; done < missing.size() && decoding.next(picture, look); ++done)
-    writeJpeg(frameFile(missing[done]), picture, kJpegQuality);
-  const std::string complaint = decoding.finish(peakBytes_);
-  if (done == missing.size()) return;
-  throw Error(video_.string(), "", fmt::format("{} of {} frames could be decoded: {}", done, missing.size(), complaint),
-              "run again with --from frames");
+  while (done < missing.size()) {
+    const size_t end = std::min(missing.size(), done + kFramesAtOnce);
+    // The numbers count what leaves the first filter, as in `choose`.
+    const std::string filters = fmt::format("yadif=deint=interlaced,select='{}',scale=iw*sar:ih,setsar=1",
+                                            selectFrames(std::span(missing).subspan(done, end - done)));
+    std::vector<std::string> arguments = command(options_.program);
+    arguments.insert(arguments.end(),
+                     {"-map", "0:V:0", "-vf", filters, "-fps_mode", "passthrough", "-frames:v",
+                      std::to_string(end - done), "-pix_fmt", "rgb24", "-c:v", "ppm", "-f", "image2pipe", "pipe:1"});
+    Decoding decoding(std::move(arguments), video_);
+    ImageU8 picture;
+    for (; done < end && decoding.next(picture, look); ++done)
+      writeJpeg(frameFile(missing[done]), picture, kJpegQuality);
+    const std::string complaint = decoding.finish(peakBytes_);
+    if (done == end) continue;
+    throw Error(video_.string(), "",
+                fmt::format("{} of {} frames could be decoded: {}", done, missing.size(), complaint),
+                "run again with --from frames");
+  }
 }
 
 bool VideoFrames::isComplete() const {

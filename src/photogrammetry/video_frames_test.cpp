@@ -136,6 +136,20 @@ TEST_F(VideoFramesOf, AVideoAreTurnedAndHaveSquarePixels) {
   EXPECT_EQ(picture.height, 96);
 }
 
+TEST_F(VideoFramesOf, ALongVideoMayBeMany) {
+  SKIP_WITHOUT_FFMPEG();
+  ChildProcess process;
+  const fs::path video = folder_ / "long.mkv";
+  ASSERT_EQ(process.start({"ffmpeg", "-nostdin", "-loglevel", "error", "-f", "lavfi", "-i",
+                           "testsrc=size=64x48:rate=100:duration=9", "-c:v", "ffv1", "-threads", "1", video.string()}),
+            "");
+  ASSERT_EQ(process.wait(), "") << process.lastWords();
+  VideoFrames frames = this->frames(video, 450);
+  take(frames);
+  EXPECT_EQ(frames.chosen(), 450u);
+  EXPECT_TRUE(frames.isComplete());
+}
+
 TEST_F(VideoFramesOf, SomethingElseAreRefused) {
   SKIP_WITHOUT_FFMPEG();
   writeFileAtomically(folder_ / "notes.mp4", "of the flight");
