@@ -120,7 +120,7 @@ TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {
                   photos_ / names[i]);
   }
   ImageU8 mask(1600, 900, 1, 255);
-  std::fill_n(mask.pixels.begin(), 1600 * 200, uint8_t{0});
+  std::fill_n(mask.pixels.begin(), 1600 * 20, uint8_t{0});
   writePng(folder_ / "masks/a b/DJI 0019.JPG.png", mask);
   const std::vector<std::string> flags = {"--until",   "capture", "--downscale", "8",
                                           "--holdout", "none",    "--masks",     (folder_ / "masks").string()};
