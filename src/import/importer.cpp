@@ -329,9 +329,9 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
     throw Error(from, "", "no photo of it can be used", "see the warnings above");
   }
 
-  std::vector<std::optional<GimbalAngles>> gimbals;
-  for (const PhotoFacts& fact : facts) gimbals.push_back(fact.tags.gimbal);
-  const Orientation orientation = orientWorld(source, gimbals);
+  std::vector<UprightTags> tags;
+  for (const PhotoFacts& fact : facts) tags.push_back({fact.tags.gimbal, fact.tags.orientation});
+  const Orientation orientation = orientWorld(source, tags);
   inform("{} photos, {} points; {}", capture.photos.size(), capture.points.size(), orientation.how);
 
   setExposures(capture, facts);

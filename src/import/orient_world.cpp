@@ -50,15 +50,32 @@ struct Up {
   std::string how;
 };
 
-Up findUp(const std::vector<Photo>& photos, const std::vector<std::optional<GimbalAngles>>& gimbals) {
+// Returns where up is, in camera axes (x right, y down), in a picture that viewers turn so.
+Vec3d upInPicture(int orientation) {
+  switch (orientation) {
+    case 3:
+    case 4:
+      return Vec3d::UnitY();
+    case 5:
+    case 6:
+      return -Vec3d::UnitX();
+    case 7:
+    case 8:
+      return Vec3d::UnitX();
+    default:
+      return -Vec3d::UnitY();
+  }
+}
+
+Up findUp(const std::vector<Photo>& photos, const std::vector<UprightTags>& tags) {
   Vec3d gimbalUp = Vec3d::Zero(), cameraUp = Vec3d::Zero(), forward = Vec3d::Zero();
   int withGimbal = 0;
   for (size_t i = 0; i < photos.size(); ++i) {
     const Mat3d& rotation = photos[i].worldFromCamera.rotation;
-    cameraUp -= rotation.col(1);
+    cameraUp += rotation * upInPicture(i < tags.size() ? tags[i].orientation : 1);
     forward += rotation.col(2);
-    if (i < gimbals.size() && gimbals[i]) {
-      gimbalUp += rotation * upInCamera(*gimbals[i]);
+    if (i < tags.size() && tags[i].gimbal) {
+      gimbalUp += rotation * upInCamera(*tags[i].gimbal);
       ++withGimbal;
     }
   }
@@ -116,7 +133,7 @@ double applySimilarity(Capture& capture, const Mat4d& newFromOld) {
   return scale;
 }
 
-Orientation orientWorld(SourceCapture& source, const std::vector<std::optional<GimbalAngles>>& gimbals) {
+Orientation orientWorld(SourceCapture& source, const std::vector<UprightTags>& tags) {
   Capture& capture = source.capture;
   if (source.isOurs || capture.photos.empty()) return {"a capture of our own: its world is kept", 1};
   Orientation orientation;
@@ -134,7 +151,7 @@ Orientation orientWorld(SourceCapture& source, const std::vector<std::optional<G
     if (source.knowsUp) {
       orientation.how = "the source's Z is up";
     } else {
-      const Up up = findUp(capture.photos, gimbals);
+      const Up up = findUp(capture.photos, tags);
       Mat4d turn = Mat4d::Identity();
       turn.topLeftCorner<3, 3>() = Eigen::Quaterniond::FromTwoVectors(up.direction, Vec3d::UnitZ()).toRotationMatrix();
       applySimilarity(capture, turn);

@@ -20,14 +20,20 @@ struct Orientation {
   double scale = 1;  // see applySimilarity
 };
 
+// What a photo tells of the up direction.
+struct UprightTags {
+  std::optional<GimbalAngles> gimbal;
+  int orientation = 1;  // of EXIF, 1 to 8: how viewers turn the picture
+};
+
 // Orients the world by the first of these cues that is available, in order of reliability:
 //   a capture of our own          the world is left unchanged
 //   GPS of three photos or more   east, north, up in metres (see georeference.h)
 //   a source whose Z is up        the world is only recentred
 //   gimbal angles                 up is the mean of the up directions that they give
-//   camera-up vectors that agree  up is their mean
+//   camera-up vectors that agree  up is their mean; of pictures that viewers turn, it is turned, too
 //   otherwise (a nadir flight)    up is the normal of the plane of the cameras, on the side that they look away from
-// `gimbals` has one entry per photo, or is empty.
-Orientation orientWorld(SourceCapture& source, const std::vector<std::optional<GimbalAngles>>& gimbals);
+// `tags` has one entry per photo, or is empty.
+Orientation orientWorld(SourceCapture& source, const std::vector<UprightTags>& tags);
 
 }  // namespace tessera

@@ -359,7 +359,7 @@ TEST(Orient, PrefersGimbalAnglesToOtherCues) {
   }
   EXPECT_LT(source.capture.photos[0].worldFromCamera.rotation.col(2).z(), 0);  // looks down
   scramble(source);
-  orientWorld(source, std::vector<std::optional<GimbalAngles>>(20, GimbalAngles{0, -60, 0}));
+  orientWorld(source, std::vector<UprightTags>(20, {GimbalAngles{0, -60, 0}, 1}));
   EXPECT_NEAR(source.capture.photos[0].worldFromCamera.rotation.col(2).z(), -std::sin(60 * M_PI / 180), 1e-9);
 }
 
@@ -379,6 +379,32 @@ TEST(Orient, TakesUpFromUprightCameras) {
   orientWorld(source, {});
   for (const Photo& photo : source.capture.photos) {
     EXPECT_NEAR((photo.worldFromCamera.rotation.col(1) + Vec3d::UnitZ()).norm(), 0, 1e-9);
+  }
+}
+
+// Viewers turn pictures of the orientation 6 by 90 degrees clockwise: their up is on the left.
+TEST(Orient, TakesUpFromPicturesThatViewersTurn) {
+  const std::pair<int, Vec3d> cases[] = {{1, -Vec3d::UnitY()}, {2, -Vec3d::UnitY()}, {3, Vec3d::UnitY()},
+                                         {4, Vec3d::UnitY()},  {5, -Vec3d::UnitX()}, {6, -Vec3d::UnitX()},
+                                         {7, Vec3d::UnitX()},  {8, Vec3d::UnitX()}};
+  for (const auto& [orientation, up] : cases) {
+    SourceCapture source;
+    for (int i = 0; i < 12; ++i) {  // an orbit
+      Photo photo;
+      const double angle = i * M_PI / 6;
+      Mat3d& rotation = photo.worldFromCamera.rotation;
+      rotation.col(2) = Vec3d(-std::cos(angle), -std::sin(angle), 0);
+      rotation.col(1) = -Vec3d::UnitZ();
+      rotation.col(0) = rotation.col(1).cross(rotation.col(2));
+      // The camera is held so that `up` of its picture points up.
+      rotation = rotation * Eigen::Quaterniond::FromTwoVectors(up, Vec3d(-Vec3d::UnitY())).toRotationMatrix();
+      photo.worldFromCamera.translation = Vec3d(5 * std::cos(angle), 5 * std::sin(angle), 1);
+      source.capture.photos.push_back(photo);
+    }
+    scramble(source);
+    orientWorld(source, std::vector<UprightTags>(12, {std::nullopt, orientation}));
+    for (const Photo& photo : source.capture.photos)
+      EXPECT_NEAR((photo.worldFromCamera.rotation * up - Vec3d::UnitZ()).norm(), 0, 1e-9) << orientation;
   }
 }
 

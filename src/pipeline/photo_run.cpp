@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/child_process.h"
@@ -423,6 +424,7 @@ class PhotoRun {
                                                                      .photos = posed_ ? posed_->photos() : list_.photos,
                                                                      .leftOut = list_.leftOut,
                                                                      .hasEvaluation = hasHoldOut()}));
+    inform("to look at the scene: tessera serve {}", out("scene").string());
     return {0, out("report.html").string()};
   }
 
@@ -446,7 +448,10 @@ void announce(const RunPlan& plan, const fs::path& folder) {
     inform("this will take about {}, up to {:.1f} GiB of memory and {:.2f} GB of disk", describeDuration(total.seconds),
            static_cast<double>(total.memoryBytes) / kGiB, static_cast<double>(total.diskBytes) / kGigabyte);
   }
-  requireRoom(plan, folder, static_cast<int64_t>(fs::space(folder).available), usableMemoryBytes());
+  std::error_code status;
+  const auto space = fs::space(folder, status);
+  constexpr int64_t kUnknown = std::numeric_limits<int64_t>::max();
+  requireRoom(plan, folder, status ? kUnknown : static_cast<int64_t>(space.available), usableMemoryBytes());
 }
 
 }  // namespace

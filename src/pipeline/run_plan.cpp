@@ -143,7 +143,7 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
   constexpr double kImportSeconds = 0.04e-6;  // for each pixel of a photo that is made smaller
   constexpr double kStartAndEnd = 5;          // seconds, of a program
   constexpr double kBytesPerPixel = 3.3;      // of a photo in memory
-  constexpr double kMaxPhotoShare = 0.4;       // of the memory: of more, training holds some at a time
+  constexpr double kMaxPhotoShare = 0.4;      // of the memory: of more, training holds some at a time
   const auto photos = static_cast<double>(size.photos), heldOut = static_cast<double>(size.heldOut);
   const auto pixels = static_cast<double>(size.photoPixels);
   const double speed = size.relativeSeconds;
