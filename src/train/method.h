@@ -103,7 +103,8 @@ struct BakeParameter {
 };
 using BakeParameters = std::map<std::string, int64_t, std::less<>>;  // by name; given ones and defaults
 
-// What a method costs on a machine of two cores, by order of magnitude: measured on a capture of 15 photos of 400×225.
+// What a method costs on a machine of two cores, by order of magnitude: measured on a capture of 15 photos of 400×225,
+// `mesh` on one of 72 photos of 400×300 in four blocks.
 struct MethodCosts {
   double secondsPerStep = 0;
   double bakeSeconds = 0;                  // whatever the photos, and
