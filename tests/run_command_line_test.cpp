@@ -109,6 +109,31 @@ TEST_F(RunCommandLine, RefusesFramesOfAFolder) {
   EXPECT_TRUE(contains(said.err, "--frames: concerns videos")) << said.err;
 }
 
+TEST_F(RunCommandLine, ServesTheSceneWhenItHasEnded) {
+  ASSERT_EQ(
+      Program(folder_.path(), {"synth", "city", photos_.string(), "--photos", "8", "--size", "32x24"}).wait().exitCode,
+      0);
+  fs::create_directories(folder_ / "site");
+  const std::vector<std::string> flags = {
+      "run", photos_.string(), (folder_ / "out").string(), "--method", "volume", "--steps", "1", "--serve",
+      "0",   "--viewer",       (folder_ / "site").string()};
+  const Said refused = Program(folder_.path(), flags).wait();
+  EXPECT_EQ(refused.exitCode, 1);
+  EXPECT_TRUE(contains(refused.err, "site: holds no viewer; run tools/build-web.sh")) << refused.err;
+  EXPECT_FALSE(fs::exists(folder_ / "out/capture")) << "nothing is done before this is known";
+
+  writeFileAtomically(folder_ / "site/index.html", std::string_view("viewer"));
+  Program program(folder_.path(), flags);
+  waitUntil(program, [&] { return contains(program.said(), "open http://127.0.0.1:"); });
+  program.kill(SIGINT);
+  const Said said = program.wait();
+  EXPECT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "report.html")) << said.out;
+  EXPECT_TRUE(fs::exists(folder_ / "out/scene/tileset.json"));
+  EXPECT_EQ(run({"--serve", "0", "--until", "bake"}).exitCode, 2) << "the scene is served at the end only";
+  EXPECT_EQ(run({"--viewer", "."}).exitCode, 2) << "it is of no use without --serve";
+}
+
 TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {
   SKIP_WITHOUT_SHARED_DATA("brighton_beach");
   if (!isInPath("colmap")) GTEST_SKIP() << "colmap is not installed";

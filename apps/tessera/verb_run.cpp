@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "apps/tessera/serving.h"
 #include "apps/tessera/verbs.h"
 #include "photogrammetry/frame_choice.h"
 #include "pipeline/photo_run.h"
@@ -38,7 +39,7 @@ void addRunVerb(CLI::App& app) {
       app.add_subcommand("run", "a folder of photos, or a video, to a scene: poses, training, baking, evaluation");
   verb->footer(
       "Run again with the same folders after an interruption: what is finished is kept.\n\n"
-      "Examples:\n  tessera run photos/ place --minutes 10\n  tessera run flight.mp4 place");
+      "Examples:\n  tessera run photos/ place --minutes 10\n  tessera run flight.mp4 place --serve 8080");
   verb->add_option("photos", options->photos,
                    "folder of photos (JPEG, PNG), a video, or photos with poses as `import` reads them")
       ->required();
@@ -70,14 +71,25 @@ void addRunVerb(CLI::App& app) {
           "photos held out for evaluation: every:N, list:FILE, none, or auto: the split of a source with poses, "
           "else every:8")
       ->capture_default_str();
-  verb->add_flag("--dry-run", options->dryRun,
-                 "only state the time, memory and disk of each stage, after features and matches of five photos");
+  CLI::Option* dryRun =
+      verb->add_flag("--dry-run", options->dryRun,
+                     "only state the time, memory and disk of each stage, after features and matches of five photos");
   verb->add_option("--from", options->range.from, "run this stage and all after it again");
-  verb->add_option("--until", options->range.until, "the last stage to run");
+  CLI::Option* until = verb->add_option("--until", options->range.until, "the last stage to run");
   verb->add_option("--threads", options->threads, "CPU threads; 0: all cores")
       ->capture_default_str()
       ->check(CLI::Range(0, 1024));
-  verb->callback([options] {
+  auto serving = std::make_shared<ServeOptions>();
+  CLI::Option* served = verb->add_option("--serve", serving->server.port,
+                                         "then serve the scene and the viewer at this TCP port; 0: any free port")
+                            ->check(portRange())
+                            ->excludes(dryRun)
+                            ->excludes(until);
+  verb->add_option("--viewer", serving->viewer, "with --serve: folder of the viewer's files")
+      ->capture_default_str()
+      ->needs(served);
+  verb->callback([options, serving, served] {
+    if (served->count() > 0) requireViewer(serving->viewer);
     options->program = fs::read_symlink("/proc/self/exe").string();
     options->costs = typicalCosts(options->method);
     options->interrupted = interrupted;
@@ -88,6 +100,9 @@ void addRunVerb(CLI::App& app) {
       std::fprintf(stderr, "interrupted; run the same command again to go on\n");
       throw CLI::RuntimeError(interruptedStatus());
     }
+    if (served->count() == 0) return;
+    serving->scene = options->out / "scene";
+    serve(*serving);
   });
 }
 
