@@ -50,10 +50,12 @@ std::optional<GpsFix> readGpsFix(const ExifData& data) {
   const auto latitude = angle(data, EXIF_TAG_GPS_LATITUDE, EXIF_TAG_GPS_LATITUDE_REF, 'S');
   const auto longitude = angle(data, EXIF_TAG_GPS_LONGITUDE, EXIF_TAG_GPS_LONGITUDE_REF, 'W');
   if (!latitude || !longitude) return std::nullopt;
-  GpsFix fix{*latitude, *longitude, 0, 0};
+  GpsFix fix{.latitude = *latitude, .longitude = *longitude, .hasAltitude = false};
   if (const ExifEntry* altitude = gpsEntry(data, EXIF_TAG_GPS_ALTITUDE, EXIF_FORMAT_RATIONAL, 1)) {
     const ExifEntry* reference = gpsEntry(data, EXIF_TAG_GPS_ALTITUDE_REF, EXIF_FORMAT_BYTE, 1);
-    fix.altitude = rational(data, *altitude, 0).value_or(0);
+    const auto metres = rational(data, *altitude, 0);
+    fix.altitude = metres.value_or(0);
+    fix.hasAltitude = metres.has_value();
     if (reference != nullptr && reference->data[0] == 1) fix.altitude = -fix.altitude;
   }
   return fix;
@@ -161,12 +163,15 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
     const XmpTags xmp = decodeXmp(text.substr(begin, end - begin));
     // Receivers with corrections write more digits there than in EXIF.
     if (xmp.latitude && xmp.longitude) {
-      GpsFix fix = tags.gps.value_or(GpsFix{});
+      GpsFix fix = tags.gps.value_or(GpsFix{.hasAltitude = false});
       fix.latitude = *xmp.latitude;
       fix.longitude = *xmp.longitude;
       if (makesSense(fix)) tags.gps = fix;
     }
-    if (tags.gps && xmp.absoluteAltitude) tags.gps->altitude = *xmp.absoluteAltitude;
+    if (tags.gps && xmp.absoluteAltitude) {
+      tags.gps->altitude = *xmp.absoluteAltitude;
+      tags.gps->hasAltitude = true;
+    }
     if (tags.gps && xmp.relativeAltitude && std::abs(*xmp.relativeAltitude) < 1e5) {
       tags.gps->relativeAltitude = *xmp.relativeAltitude;
     }

@@ -109,12 +109,22 @@ ExifBuilder southWest() {
   return builder;
 }
 
+TEST(Exif, TellsThatTheAltitudeIsUnknown) {
+  ExifBuilder builder;
+  builder.entry(1, 2, 2, {'N', 0}).rationals(2, {50, 1, 30, 1, 3600, 100});
+  builder.entry(3, 2, 2, {'E', 0}).rationals(4, {0, 1, 15, 1, 0, 1});
+  const PhotoTags tags = decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, builder.exif()));
+  ASSERT_TRUE(tags.gps.has_value());
+  EXPECT_FALSE(tags.gps->hasAltitude);
+}
+
 TEST(Exif, ReadsGpsWithItsReferences) {
   const PhotoTags tags = decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, southWest().exif()));
   ASSERT_TRUE(tags.gps.has_value());
   EXPECT_NEAR(tags.gps->latitude, -(50 + 0.5 + 0.01), 1e-12);
   EXPECT_NEAR(tags.gps->longitude, -0.25, 1e-12);
   EXPECT_EQ(tags.gps->altitude, -12.5);  // below the sea
+  EXPECT_TRUE(tags.gps->hasAltitude);
   EXPECT_FALSE(tags.gimbal.has_value());
 }
 

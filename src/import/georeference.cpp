@@ -188,6 +188,7 @@ Rise medianRise(const GeoFrame& frame, const std::vector<const Photo*>& photos, 
   for (size_t i = 0; i < photos.size(); ++i) {
     if (fit.tooHigh[static_cast<size_t>(fixes.flight[i])] != 0) continue;
     const GpsFix& gps = *photos[i]->gps;
+    if (!gps.hasAltitude) continue;
     rises.push_back(enuFromGps(frame, gps.latitude, gps.longitude, gps.altitude).z() -
                     mapped(2, static_cast<Eigen::Index>(i)));
   }
@@ -296,19 +297,26 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
   std::vector<const Photo*> fixed;
   Fixes fixes;
   bool allRelative = true;
-  Georeference result;
-  double meanRelative = 0;
+  int known = 0, all = 0;  // fixes with altitudes, and all
   for (const Photo& photo : photos) {
     if (!photo.gps) continue;
+    allRelative = allRelative && photo.gps->relativeAltitude != 0;
+    known += photo.gps->hasAltitude ? 1 : 0;
+    ++all;
+  }
+  Georeference result;
+  result.hasAltitudes = all == 0 || (known > 0 && 2 * known >= all);
+  double meanRelative = 0, altitudes = 0;
+  for (const Photo& photo : photos) {
+    if (!photo.gps || (result.hasAltitudes && !allRelative && !photo.gps->hasAltitude)) continue;
     const auto flight = flights.empty() ? 0 : static_cast<size_t>(flights[static_cast<size_t>(&photo - photos.data())]);
     if (flight >= fixes.ofFlight.size()) fixes.ofFlight.resize(flight + 1);
     fixes.ofFlight[flight].push_back(static_cast<int>(fixed.size()));
     fixes.flight.push_back(static_cast<int>(flight));
     fixed.push_back(&photo);
-    allRelative = allRelative && photo.gps->relativeAltitude != 0;
     result.frame.latitude += photo.gps->latitude;
     result.frame.longitude += photo.gps->longitude;  // the fit below fails across the antimeridian
-    result.frame.altitude += photo.gps->altitude;
+    if (photo.gps->hasAltitude) altitudes += photo.gps->altitude;
     meanRelative += photo.gps->relativeAltitude;
   }
   const auto n = static_cast<int>(fixed.size());
@@ -317,15 +325,16 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
     reason = fmt::format("{} photos with GPS; three are needed", n);
     return std::nullopt;
   }
-  for (double* mean : {&result.frame.latitude, &result.frame.longitude, &result.frame.altitude, &meanRelative})
-    *mean /= n;
+  for (double* mean : {&result.frame.latitude, &result.frame.longitude, &meanRelative}) *mean /= n;
+  if (result.hasAltitudes) result.frame.altitude = altitudes / known;
 
   Points &world = fixes.world, &enu = fixes.enu;
   world.resize(3, n);
   enu.resize(3, n);
   for (int i = 0; i < n; ++i) {
     const GpsFix& gps = *fixed[static_cast<size_t>(i)]->gps;
-    const double altitude = allRelative ? result.frame.altitude + gps.relativeAltitude - meanRelative : gps.altitude;
+    double altitude = result.hasAltitudes ? gps.altitude : 0;
+    if (allRelative) altitude = result.frame.altitude + gps.relativeAltitude - meanRelative;
     enu.col(i) = enuFromGps(result.frame, gps.latitude, gps.longitude, altitude);
     world.col(i) = fixed[static_cast<size_t>(i)]->worldFromCamera.translation;
   }
@@ -360,7 +369,7 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
   }
   if (best.inliers.size() >= 3) {
     correctFlights(fixes, best);
-    const Rise rise = allRelative ? medianRise(result.frame, fixed, fixes, best) : Rise{};
+    const Rise rise = allRelative && result.hasAltitudes ? medianRise(result.frame, fixed, fixes, best) : Rise{};
     raise(fixes, best, rise.metres);
     finish(fixes, best, result);
     result.middleError = std::hypot(result.middleError, rise.error);

@@ -24,7 +24,8 @@ struct Georeference {
     double metres = 0, error = 0;
   };
 
-  GeoFrame frame;  // origin: the mean of the photos' fixes; enuFromWorld: the similarity
+  GeoFrame frame;            // origin: the mean of the photos' fixes; enuFromWorld: the similarity
+  bool hasAltitudes = true;  // false: most fixes state none, and all altitudes are taken to be 0
   int inliers = 0, fixes = 0;
   double rmsMetres = 0;                // of the inliers, in three dimensions
   std::vector<double> heightsTooHigh;  // by flight: metres by which its altitudes are too high, corrected
@@ -50,7 +51,8 @@ inline constexpr double kMinGpsSpread = 5;  // metres
 // them agree within kGpsTolerance, or if the residual exceeds a third of that deviation. Altitudes are the drone's
 // heights above take-off where every photo has one (its barometer is far more precise than GPS), shifted to agree with
 // the median of the absolute altitudes. Horizontal coordinates and heights count by their deviations from the fit.
-// `flights`: the flight of each photo, from 0 on; empty: all are of one. Altitudes of one flight may be wrong by the
+// If only some fixes lack an absolute altitude, they are not used, unless all have heights above take-off. `flights`:
+// the flight of each photo, from 0 on; empty: all are of one. Altitudes of one flight may be wrong by the
 // same height (GPS jumps, and take-off places differ), which is estimated for flights of three fixes or more.
 std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,
                                          std::string& reason);

@@ -99,6 +99,8 @@ Up findUp(const std::vector<Photo>& photos, const std::vector<UprightTags>& tags
 
 // A flight whose altitudes are wrong is named by its first photo.
 void warnOfHeights(const SourceCapture& source, const Georeference& fit) {
+  if (!fit.hasAltitudes)
+    warn("GPS states no altitudes: the cameras are taken to be at height 0 of the Earth, on average");
   for (size_t flight = 0; flight < fit.heightsTooHigh.size(); ++flight) {
     const double metres = fit.heightsTooHigh[flight];
     if (metres == 0) continue;

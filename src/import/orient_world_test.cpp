@@ -104,6 +104,42 @@ TEST(Orient, ToleratesNoiseAndAThirdOfWildFixes) {
   for (const Photo& photo : source.capture.photos) EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.99);
 }
 
+TEST(Orient, LeavesFixesWithoutAltitudeOutIfMostHaveOne) {
+  SourceCapture source = flight();
+  for (const size_t i : {2u, 5u, 8u}) {
+    source.capture.photos[i].gps->altitude = 0;
+    source.capture.photos[i].gps->hasAltitude = false;
+  }
+  scramble(source);
+  std::string reason;
+  const auto fit = georeference(source.capture.photos, {}, reason);
+  ASSERT_TRUE(fit.has_value()) << reason;
+  EXPECT_TRUE(fit->hasAltitudes);
+  EXPECT_EQ(fit->fixes, 17);
+  EXPECT_EQ(fit->inliers, 17);
+  EXPECT_NEAR(fit->frame.altitude, 161.5, 1);
+}
+
+TEST(Orient, TellsThatNoAltitudeIsKnown) {
+  SourceCapture source = flight();
+  for (Photo& photo : source.capture.photos) {
+    photo.gps->altitude = 0;
+    photo.gps->hasAltitude = false;
+  }
+  source.capture.photos[3].gps->altitude = 160;
+  source.capture.photos[3].gps->hasAltitude = true;  // alone, it says nothing of the others
+  scramble(source);
+  std::string reason;
+  const auto fit = georeference(source.capture.photos, {}, reason);
+  ASSERT_TRUE(fit.has_value()) << reason;
+  EXPECT_FALSE(fit->hasAltitudes);
+  EXPECT_EQ(fit->inliers, 20);
+  EXPECT_EQ(fit->frame.altitude, 0);
+  testing::internal::CaptureStderr();
+  orientWorld(source, {});
+  EXPECT_NE(testing::internal::GetCapturedStderr().find("GPS states no altitudes"), std::string::npos);
+}
+
 TEST(Orient, PrefersTheBarometerToGpsHeights) {
   SourceCapture source = flight();
   int i = 0;

@@ -270,7 +270,8 @@ bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& fil
     const double latitude = numberOr(gps, "latitude", std::nan("")),
                  longitude = numberOr(gps, "longitude", std::nan(""));
     if (std::abs(latitude) <= 90 && std::abs(longitude) <= 360) {
-      frame.gps = GpsFix{latitude, longitude, numberOr(gps, "altitude", 0), numberOr(gps, "relative_altitude", 0)};
+      frame.gps = GpsFix{latitude, longitude, numberOr(gps, "altitude", 0), numberOr(gps, "relative_altitude", 0),
+                         gps.contains("altitude")};
     }
   }
   file.frames.push_back(std::move(frame));

@@ -34,6 +34,7 @@ Json toJson(const Georeference& fit, const SourceCapture& source) {
       {"origin",
        {{"latitude", fit.frame.latitude}, {"longitude", fit.frame.longitude}, {"altitude", fit.frame.altitude}}},
       {"enu_from_model", std::move(matrix)},
+      {"has_altitudes", fit.hasAltitudes},
       {"fixes", fit.fixes},
       {"agreeing", fit.inliers},
       {"rms_metres", fit.rmsMetres},
@@ -101,6 +102,7 @@ GeoreferenceFile parseGeoreference(const Json& json) {
     if (parsed.reason.empty()) throw Damaged();
     return parsed;
   }
+  parsed.hasAltitudes = toBool(member(json, "has_altitudes"));
   parsed.fixes = toCount(member(json, "fixes"));
   parsed.inliers = toCount(member(json, "agreeing"));
   if (parsed.inliers > parsed.fixes) throw Damaged();
@@ -148,7 +150,7 @@ GeoreferenceFile readGeoreference(const fs::path& file) {
   try {
     return parseGeoreference(Json::parse(readTextFile(file), nullptr, false));
   } catch (const Damaged&) {
-    throw Error(file.string(), "", "does not describe a georeference", "run again with --from georeferencing");
+    throw Error(file.string(), "", "does not describe a georeference", "remove it, and run again");
   }
 }
 

@@ -90,7 +90,7 @@ TEST_F(GeoreferenceJson, IsRefusedIfItIsDamaged) {
       ADD_FAILURE() << "was read: " << text;
     } catch (const Error& error) {
       EXPECT_EQ(error.subject(), file_.string());
-      EXPECT_EQ(error.remedy(), "run again with --from georeferencing");
+      EXPECT_EQ(error.remedy(), "remove it, and run again");
     }
   };
   const std::string text = whole.dump();

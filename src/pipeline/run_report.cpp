@@ -189,6 +189,8 @@ class RunPage {
           "form a {}. Photos that look aslant, or lines that cross at another height, prevent it.</li>\n",
           georeference_.bend->metres, georeference_.bend->error, georeference_.bend->metres > 0 ? "dome" : "bowl");
     }
+    if (!georeference_.hasAltitudes)
+      html += "<li>GPS states no altitudes: the cameras are taken to be at height 0 of the Earth, on average.</li>\n";
     NamesByReason unusable, withoutPose;
     for (const LeftOutPhoto& photo : input_.leftOut) unusable[photo.reason].push_back(photo.name);
     for (const LeftOutPhoto& photo : withoutPose_) withoutPose[photo.reason].push_back(photo.name);

@@ -191,7 +191,7 @@ TEST_F(RunReport, RefusesDamagedFilesWithARemedy) {
     }
     writeFileAtomically(out_ / name, before);
   };
-  expectError("poses/georeference.json", "{\"fixes\": 4}", "run again with --from georeferencing");
+  expectError("poses/georeference.json", "{\"fixes\": 4}", "remove it, and run again");
   expectError("poses/left_out.json", "[1]", "remove it, and run again");
   for (const char* text :
        {"{", "[]", "{\"psnr\": 20}", "{\"psnr\": 1, \"ssim\": \"a\", \"exposure\": \"\", \"views\": []}",

@@ -19,6 +19,7 @@ struct GpsFix {
   double latitude = 0, longitude = 0;  // degrees, WGS 84
   double altitude = 0;                 // metres above the ellipsoid (or the sea, as the photo's EXIF gives it)
   double relativeAltitude = 0;         // metres above take-off, 0 when unknown
+  bool hasAltitude = true;             // false: `altitude` is 0 because it is unknown
 };
 
 struct Photo {

@@ -124,8 +124,8 @@ Json frameToJson(const Capture& capture, const Photo& photo) {
   if (photo.gps) {
     ours["gps"] = {{"latitude", photo.gps->latitude},
                    {"longitude", photo.gps->longitude},
-                   {"altitude", photo.gps->altitude},
                    {"relative_altitude", photo.gps->relativeAltitude}};
+    if (photo.gps->hasAltitude) ours["gps"]["altitude"] = photo.gps->altitude;
   }
   return frame;
 }
