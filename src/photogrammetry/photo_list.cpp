@@ -6,6 +6,7 @@
 #include <cctype>
 #include <cmath>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <set>
 #include <tuple>
 
@@ -153,6 +154,16 @@ double focalLengthInPixels(const CameraTags& camera, int width, int height) {
   return plausible(camera.focalLength * camera.pixelsPerMillimetre);
 }
 
+// Only such names can be stored in a capture.
+bool isUtf8(const std::string& name) {
+  try {
+    nlohmann::json(name).dump();
+  } catch (const nlohmann::json::type_error&) {
+    return false;
+  }
+  return true;
+}
+
 PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
   std::vector<fs::path> files = photoFiles(folder);
   std::sort(files.begin(), files.end(),
@@ -171,6 +182,10 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
   for (size_t i = 0; i < files.size(); ++i) {
     const Header& header = headers[i];
     const std::string name = files[i].lexically_relative(folder).generic_string();
+    if (!isUtf8(name)) {
+      list.leftOut.push_back({name, "its name is not UTF-8; rename it"});
+      continue;
+    }
     if (isOtherFormat(files[i])) {
       list.leftOut.push_back({name, "in a format that is not read; convert it to JPEG"});
       continue;

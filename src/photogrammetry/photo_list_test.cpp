@@ -50,6 +50,18 @@ TEST_F(PhotoLists, LeaveOutWhatIsNoPhotoOrACopy) {
   EXPECT_EQ(list.leftOut[1].name + " " + list.leftOut[1].reason, "two.jpg the same file as another photo");
 }
 
+TEST_F(PhotoLists, LeaveOutNamesThatACaptureCannotHave) {
+  write("one.jpg", 1);
+  write(
+      "S\xfc"
+      "d.jpg",
+      2);
+  const PhotoList list = this->list();
+  EXPECT_EQ(list.photos.size(), 1u);
+  ASSERT_EQ(list.leftOut.size(), 1u);
+  EXPECT_EQ(list.leftOut[0].reason, "its name is not UTF-8; rename it");
+}
+
 TEST_F(PhotoLists, TellSizesApartAsCameras) {
   writeJpeg(folder_ / "a.jpg", ImageU8(8, 6, 3));
   writeJpeg(folder_ / "b.jpg", ImageU8(6, 8, 3));

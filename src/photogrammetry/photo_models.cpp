@@ -13,6 +13,8 @@
 #include "base/log.h"
 #include "import/colmap_model.h"
 #include "import/georeference.h"
+#include "photogrammetry/colmap_database.h"
+#include "photogrammetry/model_folders.h"
 
 namespace tessera {
 namespace {
@@ -45,55 +47,6 @@ int64_t lastRegistered(const fs::path& log) {
   if (at == text.npos) return 0;
   const size_t open = text.find('(', at);
   return open == text.npos ? 0 : std::atoll(text.c_str() + open + 1);
-}
-
-// Returns the photos of a model, by the numbers that the database gives them, less 1: indices into the list. Nothing of
-// a model that was not written to its end.
-std::set<int> photosIn(const fs::path& folder) {
-  std::set<int> photos;
-  std::error_code status;
-  if (!fs::exists(folder / "images.bin", status) || !fs::exists(folder / "points3D.bin", status)) return photos;
-  try {
-    for (const ColmapModel::Image& image : readColmapModel(folder).images)
-      photos.insert(static_cast<int>(image.id) - 1);
-  } catch (const Error&) {
-    photos.clear();
-  }
-  return photos;
-}
-
-struct Piece {
-  fs::path folder;
-  std::set<int> photos;
-};
-
-// Returns the readable models in a folder, the largest first.
-std::vector<Piece> piecesIn(const fs::path& folder) {
-  std::vector<Piece> pieces;
-  std::error_code status;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
-    Piece piece{entry.path(), photosIn(entry.path())};
-    if (!piece.photos.empty()) pieces.push_back(std::move(piece));
-  }
-  std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
-    return a.photos.size() != b.photos.size() ? a.photos.size() > b.photos.size()
-                                              : naturalLess(a.folder.string(), b.folder.string());
-  });
-  return pieces;
-}
-
-// Returns the number of records that a file of a model states, which it begins with; 0 if it is missing.
-uint64_t statedCount(const fs::path& path) {
-  uint64_t count = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file.read(reinterpret_cast<char*>(&count), sizeof count)) return 0;
-  return count;
-}
-
-// Returns the number of photos that a model states, without reading all of it; 0 if it is not complete.
-uint64_t statedPhotos(const fs::path& folder) {
-  std::error_code status;
-  return fs::exists(folder / "points3D.bin", status) ? statedCount(folder / "images.bin") : 0;
 }
 
 // Whether the photos of a model see enough points to say how they stand. Those of a camera that only turns see none.
@@ -247,12 +200,13 @@ void PhotoModels::map(bool resumes, const Watch& watch) {
     if (readEnd(folder_ / "mapping.log").find(kNoModel) == std::string::npos) throw;
   }
   // Going on from a snapshot, it writes one model, into the folder itself.
-  if (!photosIn(partial).empty()) {
+  const bool wentOn = !photosIn(partial).empty();
+  if (wentOn) {
     makeFolder(partial / "0");
     for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
       fs::rename(partial / name, partial / "0" / name);
   }
-  mapRest(partial, watch);
+  mapRest(partial, wentOn, watch);
   for (const Piece& piece : piecesIn(partial))
     if (!isSupported(piece)) removeFolder(piece.folder);
   if (piecesIn(partial).empty()) {
@@ -266,18 +220,23 @@ void PhotoModels::map(bool resumes, const Watch& watch) {
   discardJoined();
 }
 
-void PhotoModels::mapRest(const fs::path& models, const Watch& watch) {
+void PhotoModels::mapRest(const fs::path& models, bool withNeighbours, const Watch& watch) {
   const fs::path list = folder_ / "rest.txt", rest = folder_ / "rest.partial";
   std::set<int> placed;
   for (const Piece& piece : piecesIn(models)) placed.insert(piece.photos.begin(), piece.photos.end());
-  std::string names;
-  size_t count = 0;
-  for (size_t i = 0; i < list_.photos.size(); ++i) {
-    if (placed.contains(static_cast<int>(i))) continue;
-    names += list_.photos[i].safeName + "\n";
-    ++count;
+  std::set<int> mapped;
+  for (int i = 0; i < static_cast<int>(list_.photos.size()); ++i)
+    if (!placed.contains(i)) mapped.insert(i);
+  if (placed.empty() || mapped.size() < 3) return;
+  if (withNeighbours) {
+    const std::set<int> missing = mapped;
+    for (const auto& [pair, inliers] : ColmapDatabase(folder_ / "database.db").inliers()) {
+      if (inliers == 0 || missing.contains(pair.first) == missing.contains(pair.second)) continue;
+      mapped.insert({pair.first, pair.second});
+    }
   }
-  if (placed.empty() || count < 3) return;
+  std::string names;
+  for (const int i : mapped) names += list_.photos[static_cast<size_t>(i)].safeName + "\n";
   writeFileAtomically(list, names);
   removeFolder(rest);
   makeFolder(rest);
@@ -388,7 +347,8 @@ int PhotoModels::join(const Watch& watch) {
   }
   runColmap("joining",
             {"point_triangulator", "--database_path", (folder_ / "database.db").string(), "--image_path",
-             (folder_ / "images").string(), "--input_path", result.string(), "--output_path", points.string()},
+             (folder_ / "images").string(), "--input_path", result.string(), "--output_path", points.string(),
+             "--Mapper.num_threads", settings_.threadsText()},
             [&] { watch(0); });
   runColmap("joining",
             {"bundle_adjuster", "--input_path", points.string(), "--output_path", adjusted.string(),

@@ -60,8 +60,9 @@ class PhotoModels {
  private:
   fs::path last(bool adjusted) const;
   // Adds models of the photos that are in none: once there is a model, the mapper begins no other unless a pair is very
-  // well connected.
-  void mapRest(const fs::path& models, const Watch& watch);
+  // well connected. With neighbours: also of the placed photos that are matched with them, so that the models can be
+  // joined.
+  void mapRest(const fs::path& models, bool withNeighbours, const Watch& watch);
   void runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch);
   void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
   bool agreesWithGps(const fs::path& joined, const fs::path& before) const;

@@ -72,14 +72,24 @@ TEST_F(PhotoModelsTest, IncludeThoseOfPhotosThatTheFirstLacks) {
 
 TEST_F(PhotoModelsTest, GoOnFromTheLastSnapshotThatIsWhole) {
   const std::string model = prepared("whole", numbers(0, 18)), fewer = prepared("fewer", numbers(0, 9));
+  fs::create_directories(folder_ / "poses");
+  makeDatabase(folder_ / "poses/database.db");
+  // Photos 17 and 18 are matched: the former is mapped again with those that the model lacks, to be joined with it.
+  addInliers(folder_ / "poses/database.db", 17, 18, 60);
   // The first run writes snapshots and fails; with a model to go on from, it returns that model.
-  PhotoModels estimated = models("if [ -n \"$input_path\" ]; then cp $input_path/* $output_path; exit; fi\ncp -r " +
-                                 model + " $Mapper_snapshot_path/18446744073709551615; cp -r " + fewer +
-                                 " $Mapper_snapshot_path/8; mkdir $Mapper_snapshot_path/7; cp " + model +
-                                 "/images.bin $Mapper_snapshot_path/7; exit 1");
+  const std::string listed = (folder_ / "listed").string();
+  PhotoModels estimated =
+      models("if [ -n \"$image_list_path\" ]; then cp $image_list_path " + listed +
+                 "; echo failed to create sparse model; exit 1; fi\nif [ -n \"$input_path\" ]; then cp $input_path/* "
+                 "$output_path; exit; fi\ncp -r " +
+                 model + " $Mapper_snapshot_path/18446744073709551615; cp -r " + fewer +
+                 " $Mapper_snapshot_path/8; mkdir $Mapper_snapshot_path/7; cp " + model +
+                 "/images.bin $Mapper_snapshot_path/7; : > $Mapper_snapshot_path/7/points3D.bin; exit 1",
+             true);
   EXPECT_THROW(estimated.map(false, ignore), Error);
   EXPECT_TRUE(fs::exists(folder_ / "poses/snapshots/7"));
   estimated.map(true, ignore);
+  EXPECT_EQ(readTextFile(listed).substr(0, 16), "p17.jpg\np18.jpg\n");
   EXPECT_EQ(estimated.unplaced(), numbers(18, 50));
   EXPECT_EQ(estimated.read().capture.photos.size(), 18u);
   EXPECT_FALSE(fs::exists(folder_ / "poses/snapshots"));

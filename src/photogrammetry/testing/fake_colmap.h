@@ -40,6 +40,17 @@ inline std::string errorMessage(const std::function<void()>& action) {
   return "";
 }
 
+// Adds to COLMAP's tables that two photos, by their indices, have been compared.
+inline void addInliers(const fs::path& file, int first, int second, int inliers) {
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open(file.c_str(), &handle), SQLITE_OK);
+  const int64_t pair = (first + 1) * int64_t{2147483647} + second + 1;
+  const std::string row =
+      "INSERT INTO two_view_geometries VALUES(" + std::to_string(pair) + ", " + std::to_string(inliers) + ");";
+  EXPECT_EQ(sqlite3_exec(handle, row.c_str(), nullptr, nullptr, nullptr), SQLITE_OK);
+  sqlite3_close(handle);
+}
+
 // COLMAP's tables, as far as they are used here, with features of the first two photos and two compared pairs.
 inline void makeDatabase(const fs::path& file) {
   sqlite3* handle = nullptr;

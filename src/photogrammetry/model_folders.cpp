@@ -1,0 +1,49 @@
+#include "photogrammetry/model_folders.h"
+
+#include <algorithm>
+#include <fstream>
+
+#include "base/error.h"
+#include "import/colmap_model.h"
+
+namespace tessera {
+
+uint64_t statedCount(const fs::path& path) {
+  uint64_t count = 0;
+  std::ifstream file(path, std::ios::binary);
+  if (!file.read(reinterpret_cast<char*>(&count), sizeof count)) return 0;
+  return count;
+}
+
+std::set<int> photosIn(const fs::path& folder) {
+  std::set<int> photos;
+  std::error_code status;
+  if (!fs::exists(folder / "images.bin", status) || statedCount(folder / "points3D.bin") == 0) return photos;
+  try {
+    for (const ColmapModel::Image& image : readColmapModel(folder).images)
+      photos.insert(static_cast<int>(image.id) - 1);
+  } catch (const Error&) {
+    photos.clear();
+  }
+  return photos;
+}
+
+std::vector<Piece> piecesIn(const fs::path& folder) {
+  std::vector<Piece> pieces;
+  std::error_code status;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
+    Piece piece{entry.path(), photosIn(entry.path())};
+    if (!piece.photos.empty()) pieces.push_back(std::move(piece));
+  }
+  std::sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
+    return a.photos.size() != b.photos.size() ? a.photos.size() > b.photos.size()
+                                              : naturalLess(a.folder.string(), b.folder.string());
+  });
+  return pieces;
+}
+
+uint64_t statedPhotos(const fs::path& folder) {
+  return statedCount(folder / "points3D.bin") > 0 ? statedCount(folder / "images.bin") : 0;
+}
+
+}  // namespace tessera

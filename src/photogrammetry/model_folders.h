@@ -1,0 +1,30 @@
+// Folders of models that COLMAP has written, some of which may have been interrupted: their points are written last.
+#pragma once
+
+#include <cstdint>
+#include <set>
+#include <vector>
+
+#include "base/file.h"
+
+namespace tessera {
+
+// A model with the photos in it, by the numbers that the database gives them, less 1: indices into the list.
+struct Piece {
+  fs::path folder;
+  std::set<int> photos;
+};
+
+// Returns the photos of a model; nothing of one that was not written to its end.
+std::set<int> photosIn(const fs::path& folder);
+
+// Returns the readable models in a folder, the largest first.
+std::vector<Piece> piecesIn(const fs::path& folder);
+
+// Returns the number of records that a file of a model states, which it begins with; 0 if it is missing.
+uint64_t statedCount(const fs::path& path);
+
+// Returns the number of photos that a model states, without reading all of it; 0 if it was not written to its end.
+uint64_t statedPhotos(const fs::path& folder);
+
+}  // namespace tessera
