@@ -23,6 +23,7 @@ std::vector<std::string> bakedMethods() {
 TrainingCosts typicalCosts(const std::string& method) {
   const MethodCosts costs = findMethod(method)->costs;
   return {.secondsPerStep = costs.secondsPerStep,
+          .raysPerSecond = costs.raysPerSecond,
           .bakeSeconds = costs.bakeSeconds,
           .secondsPerBakedMegapixel = costs.secondsPerBakedMegapixel,
           .secondsPerRenderedMegapixel = costs.secondsPerRenderedMegapixel,
@@ -63,7 +64,9 @@ void addRunVerb(CLI::App& app) {
       ->excludes(steps);
   verb->add_option(
           "--downscale", options->downscale,
-          fmt::format("divides width and height; 0: until the longer side has at most {} pixels", kLongestSide))
+          fmt::format("divides width and height; 0: so that the minutes suffice to train all pixels, until the longer "
+                      "side has {} pixels to {}",
+                      kShortestSide, kLongestSide))
       ->capture_default_str()
       ->check(CLI::Range(0, 64));
   verb->add_option(

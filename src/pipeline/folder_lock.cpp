@@ -19,6 +19,9 @@ FolderLock::FolderLock(const fs::path& folder) {
   file_.reset(::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
   if (file_.get() < 0) throw Error(file.string(), "", std::strerror(errno), "name a folder that can be written to");
   if (::flock(file_.get(), LOCK_EX | LOCK_NB) == 0) {
+    if (readTextFile(file).find_first_not_of("0123456789\n") != std::string::npos)
+      throw Error(file.string(), "", "was not made by such a run, and would be replaced",
+                  "name another folder to write to");
     const std::string number = fmt::format("{}\n", ::getpid());
     if (::ftruncate(file_.get(), 0) == 0) [[maybe_unused]]
       const auto written = ::write(file_.get(), number.data(), number.size());

@@ -25,6 +25,13 @@ TEST(FolderLock, HoldsOffOthersUntilItEnds) {
   EXPECT_NO_THROW(FolderLock{place});
 }
 
+TEST(FolderLock, LeavesTheFileOfAnotherProgramAsItIs) {
+  const TemporaryFolder folder;
+  writeFileAtomically(folder / "lock", "of a package manager");
+  EXPECT_THROW(FolderLock{folder.path()}, Error);
+  EXPECT_EQ(readTextFile(folder / "lock"), "of a package manager");
+}
+
 TEST(FolderLock, EndsWithAProcessThatIsKilled) {
   const TemporaryFolder folder;
   const pid_t other = ::fork();

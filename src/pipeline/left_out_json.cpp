@@ -1,5 +1,6 @@
 #include "pipeline/left_out_json.h"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
@@ -16,6 +17,17 @@ void writeLeftOut(const fs::path& file, const std::vector<LeftOutPhoto>& photos)
   for (const LeftOutPhoto& photo : photos) json.push_back({{"photo", photo.name}, {"reason", photo.reason}});
   // Names of photos need not be UTF-8.
   writeFileAtomically(file, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+void addLeftOut(const fs::path& file, const std::set<std::string>& names, const std::string& reason) {
+  std::error_code status;
+  if (names.empty() || !fs::exists(file, status)) return;
+  std::vector<LeftOutPhoto> photos = readLeftOut(file);
+  for (const std::string& name : names) {
+    const auto isIt = [&name](const LeftOutPhoto& photo) { return photo.name == name; };
+    if (std::none_of(photos.begin(), photos.end(), isIt)) photos.push_back({name, reason});
+  }
+  writeLeftOut(file, photos);
 }
 
 std::vector<LeftOutPhoto> readLeftOut(const fs::path& file) {

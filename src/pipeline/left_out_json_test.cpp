@@ -20,6 +20,19 @@ TEST(LeftOutJson, ReadsWhatItWrites) {
   EXPECT_EQ(photos[1].name, "\xef\xbf\xbd.jpg") << "U+FFFD";
 }
 
+TEST(LeftOutJson, NamesEachPhotoOnce) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "left_out.json";
+  addLeftOut(file, {"a.jpg"}, "damaged");
+  EXPECT_FALSE(fs::exists(file)) << "the stage that writes it says more";
+  writeLeftOut(file, {{"b.jpg", "few features"}});
+  for (int repetition = 0; repetition < 2; ++repetition) addLeftOut(file, {"a.jpg", "b.jpg"}, "damaged");
+  const std::vector<LeftOutPhoto> photos = readLeftOut(file);
+  ASSERT_EQ(photos.size(), 2u);
+  EXPECT_EQ(photos[0].reason, "few features");
+  EXPECT_EQ(photos[1].name + " " + photos[1].reason, "a.jpg damaged");
+}
+
 TEST(LeftOutJson, IsRefusedIfItIsDamaged) {
   const TemporaryFolder folder;
   const fs::path file = folder / "left_out.json";

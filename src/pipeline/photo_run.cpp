@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <limits>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/child_process.h"
 #include "base/error.h"
 #include "base/log.h"
-#include "base/memory.h"
 #include "base/order_statistics.h"
 #include "base/progress.h"
 #include "import/georeference.h"
@@ -103,9 +102,14 @@ class PhotoRun {
          .isComplete = has("poses/georeference.json"),
          .run = [this](bool) { return georeferencing(); }},
         {.name = "capture",
-         .settings = fmt::format("{} {}", frames_ ? options_.downscale : downscale(), describeHoldOut()) +
-                     (posed_ ? " " + posed_->digest() : ""),
-         .isComplete = has("capture/transforms.json"),
+         .settings =
+             (frames_ && options_.downscale == 0 ? options_.method + " " + training : std::to_string(downscale())) +
+             " " + describeHoldOut() + (posed_ ? " " + posed_->digest() : ""),
+         .isComplete =
+             [this] {
+               return has("capture/transforms.json")() &&
+                      (!posed_ || (has("poses/left_out.json")() && has("poses/georeference.json")()));
+             },
          .needs = [this](bool) { return trainingNeeds().capture; },
          .run = [this](bool) { return capture(); }},
         {.name = "train",
@@ -141,9 +145,11 @@ class PhotoRun {
     for (Stage& stage : stages)
       stage.needs = [this, needs = stage.needs](bool resumes) { return isListed() ? needs(resumes) : StageNeeds{}; };
     Stage frames = frames_->stage();
+    frames.revealsNeeds = true;
     frames.run = [this, take = frames.run](bool resumes) {
       const StageOutcome outcome = take(resumes);
       list();
+      announcePlan(planStages(options_.out, this->stages(), options_.range), options_.out);
       return outcome;
     };
     stages.insert(stages.begin(), std::move(frames));
@@ -160,7 +166,7 @@ class PhotoRun {
                   "name a folder of JPEG or PNG photos, or a video");
     }
     if (masks_) masks_->addTo(list_);
-    estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, describePhotos(), downscale());
+    estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, describePhotos());
   }
 
   fs::path out(const char* name) const { return options_.out / name; }
@@ -236,6 +242,7 @@ class PhotoRun {
     }
     const ChosenPairs chosen{choosePairs(list_, lookAlikes), lookAlikes};
     writePairs(pairsFile(), chosen);
+    estimator_->setPairs(chosen.pairs.size());
     return {matches_->takePeakBytes(),
             fmt::format("{} of {}", chosen.pairs.size(), list_.photos.size() * (list_.photos.size() - 1) / 2)};
   }
@@ -325,22 +332,21 @@ class PhotoRun {
 
   int downscale() const {
     if (options_.downscale > 0) return options_.downscale;
-    if (posed_) return (posed_->longerSide() + kLongestSide - 1) / kLongestSide;
-    std::vector<int> sides;
-    for (const ListedPhoto& photo : list_.photos) {
-      const CameraBody& body = list_.bodies[static_cast<size_t>(photo.body)];
-      sides.push_back(std::max(body.width, body.height));
-    }
-    const int longest = upperMedian(sides);
-    return (longest + kLongestSide - 1) / kLongestSide;
+    return chooseDownscale(posed_ ? posed_->trainingSize() : estimator_->trainingSize(), options_.costs);
   }
 
   StageOutcome capture() {
+    SourceCapture source = posed_ ? posed_->take(out("poses")) : models_->read();
+    std::set<std::string> dropped;
+    for (const Photo& photo : source.capture.photos) dropped.insert(photo.name);
     const Capture capture =
-        importSource(posed_ ? posed_->take(out("poses")) : models_->read(), options_.photos.string(), out("capture"),
+        importSource(std::move(source), options_.photos.string(), out("capture"),
                      {.downscale = downscale(), .holdout = options_.holdout, .threads = options_.threads});
-    return {0, fmt::format("{} photos, {} held out{}", capture.photos.size(), capture.photosIn(Split::test).size(),
-                           capture.geo ? ", georeferenced" : "")};
+    for (const Photo& photo : capture.photos) dropped.erase(photo.name);
+    addLeftOut(leftOutFile(), dropped, "damaged: it ends early, or cannot be decoded");
+    const std::string size = downscale() > 1 ? fmt::format(", made smaller by {}", downscale()) : "";
+    return {0, fmt::format("{} photos, {} held out{}{}", capture.photos.size(), capture.photosIn(Split::test).size(),
+                           capture.geo ? ", georeferenced" : "", size)};
   }
 
   // Runs a verb of this program; its messages are in logs/VERB.log, and the last one is shown meanwhile.
@@ -416,7 +422,7 @@ class PhotoRun {
 
   StageOutcome report() {
     // Folders of earlier versions lack it.
-    if (!has("poses/left_out.json")())
+    if (!posed_ && !has("poses/left_out.json")())
       writeLeftOut(leftOutFile(), matches_->explain(models_->unplaced(), models_->placedApart()));
     const fs::path folder = fs::absolute(options_.photos / "").lexically_normal().parent_path();
     writeFileAtomically(out("report.html"), runReport(options_.out, {.title = folder.filename().string(),
@@ -428,7 +434,9 @@ class PhotoRun {
     return {0, out("report.html").string()};
   }
 
-  TrainingNeeds trainingNeeds() { return posed_ ? posed_->trainingNeeds(downscale()) : estimator_->trainingNeeds(); }
+  TrainingNeeds trainingNeeds() {
+    return posed_ ? posed_->trainingNeeds(downscale()) : estimator_->trainingNeeds(downscale());
+  }
 
   PhotoRunOptions options_;
   std::optional<PosedSource> posed_;
@@ -440,18 +448,18 @@ class PhotoRun {
   std::unique_ptr<RunEstimator> estimator_;
 };
 
-// States what will be taken; refuses what does not fit.
-void announce(const RunPlan& plan, const fs::path& folder) {
-  constexpr double kGiB = 1 << 30, kGigabyte = 1e9, kLongSeconds = 30;
-  const StageNeeds total = plan.total();
-  if (total.seconds > kLongSeconds) {
-    inform("this will take about {}, up to {:.1f} GiB of memory and {:.2f} GB of disk", describeDuration(total.seconds),
-           static_cast<double>(total.memoryBytes) / kGiB, static_cast<double>(total.diskBytes) / kGigabyte);
-  }
-  std::error_code status;
-  const auto space = fs::space(folder, status);
-  constexpr int64_t kUnknown = std::numeric_limits<int64_t>::max();
-  requireRoom(plan, folder, status ? kUnknown : static_cast<int64_t>(space.available), usableMemoryBytes());
+// The command with all that has been asked for.
+std::string describeRequest(const PhotoRunOptions& options) {
+  std::string text = fmt::format("run {} {} --method {} --holdout {}", options.photos.string(), options.out.string(),
+                                 options.method, options.holdout);
+  text += options.steps > 0 ? fmt::format(" --steps {}", options.steps) : fmt::format(" --minutes {}", options.minutes);
+  if (options.downscale > 0) text += fmt::format(" --downscale {}", options.downscale);
+  if (options.frames > 0) text += fmt::format(" --frames {}", options.frames);
+  if (options.threads > 0) text += fmt::format(" --threads {}", options.threads);
+  if (!options.masks.empty()) text += " --masks " + options.masks.string();
+  if (!options.range.from.empty()) text += " --from " + options.range.from;
+  if (!options.range.until.empty()) text += " --until " + options.range.until;
+  return text;
 }
 
 }  // namespace
@@ -468,24 +476,25 @@ void runFromPhotos(const PhotoRunOptions& options) {
                 "name another folder to write to");
   }
   checkHoldOut(options.holdout);
-  for (const char* name : {"frames", "poses", "capture", "model", "scene"}) {
+  for (const char* name : {"frames", "poses", "capture", "model", "scene", "probe", "logs", "report.html",
+                           "evaluation.html", "eval.json"}) {
     if (!fs::exists(options.out / name, status) || fs::exists(options.out / "run.json", status)) continue;
     throw Error((options.out / name).string(), "", "was not made by such a run, and would be replaced",
                 "name another folder to write to");
   }
   const FolderLock lock(options.out);
+  claimFolder(options.out);
   PhotoRun run(options);
   const std::vector<Stage> stages = run.stages();
   if (options.dryRun && !run.isListed())
     throw Error("--dry-run", "", "the photos of this video are not there yet", "run with --until frames first");
   const RunPlan plan = planStages(options.out, stages, options.range);
   if (options.dryRun) fmt::print("{}", describePlan(plan));
-  announce(plan, options.out);
+  announcePlan(plan, options.out);
   if (options.dryRun) return;
-  runStages(options.out, fmt::format("run {} {}", options.photos.string(), options.out.string()), stages, options.range,
-            [&] {
-              if (options.interrupted()) throw RunInterrupted();
-            });
+  runStages(options.out, describeRequest(options), stages, options.range, [&] {
+    if (options.interrupted()) throw RunInterrupted();
+  });
 }
 
 }  // namespace tessera

@@ -32,7 +32,7 @@ struct PhotoRunOptions {
   std::string method;
   double minutes = 10;           // of training
   int64_t steps = 0;             // instead of minutes, if above 0
-  int downscale = 0;             // 0: so that the longer side of most photos has at most kLongestSide pixels
+  int downscale = 0;             // 0: chooseDownscale
   std::string holdout = "auto";  // as for `import`; of photos without poses: every:8
   int threads = 0;               // 0: all
   std::string program;           // this program, which trains, bakes and evaluates
@@ -44,8 +44,6 @@ struct PhotoRunOptions {
 
 // Thrown where `interrupted` has said so. What was done so far is kept.
 struct RunInterrupted {};
-
-inline constexpr int kLongestSide = 1600;  // pixels
 
 // States what will be taken, and runs what is not finished. Throws Error before the first stage if memory or disk are
 // too small. Throws Error naming what cannot go on, or RunInterrupted; what was done so far is kept.

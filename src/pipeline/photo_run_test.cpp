@@ -9,6 +9,7 @@
 #include "base/testing/shared_data.h"
 #include "base/testing/temporary_folder.h"
 #include "pipeline/georeference_json.h"
+#include "pipeline/left_out_json.h"
 
 namespace tessera {
 namespace {
@@ -77,6 +78,51 @@ TEST_F(PhotoRuns, OfPosedPhotosBeginAtTheCapture) {
   EXPECT_TRUE(contains(said, "8 photos, 1 held out")) << said;
   options_.range.from = "features";
   EXPECT_TRUE(contains(run(), "name one of capture, train, bake, evaluate, report"));
+}
+
+TEST_F(PhotoRuns, OfPosedPhotosImportThemAgainIfWhatTheReportNeedsIsLost) {
+  writePosed(9);
+  run();
+  fs::remove(options_.out / "poses/left_out.json");
+  const std::string said = run();
+  EXPECT_FALSE(contains(said, "capture    finished before")) << said;
+  EXPECT_TRUE(has("poses/left_out.json"));
+}
+
+TEST_F(PhotoRuns, NamePhotosThatTheCaptureLacks) {
+  writePosed(9);
+  const std::string png = readTextFile(options_.photos / "images/a4.png");
+  writeFileAtomically(options_.photos / "images/a4.png", png.substr(0, png.size() - 20));
+  const std::string said = run();
+  EXPECT_TRUE(contains(said, "8 photos")) << said;
+  const std::vector<LeftOutPhoto> leftOut = readLeftOut(options_.out / "poses/left_out.json");
+  ASSERT_EQ(leftOut.size(), 1u);
+  EXPECT_TRUE(contains(leftOut[0].name, "a4.png"));
+}
+
+TEST_F(PhotoRuns, OfPosedPhotosAreRepeatedIfTheirPlaceOnTheEarthChanges) {
+  const auto placed = [&](const char* longitude) {
+    writePosed(9, std::string(R"("tessera":{"geo":{"latitude":50,"longitude":)") + longitude +
+                      R"(,"altitude":100,"enu_from_world":[[1,0,0,0],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}},)");
+    for (int i = 0; i < 9; ++i)
+      fs::last_write_time(options_.photos / ("images/a" + std::to_string(i) + ".png"), fs::file_time_type{});
+  };
+  placed("8");
+  run();
+  placed("8");
+  EXPECT_TRUE(contains(run(), "capture    finished before"));
+  placed("9");
+  EXPECT_FALSE(contains(run(), "capture    finished before"));
+}
+
+TEST_F(PhotoRuns, RefuseFoldersOfOtherPrograms) {
+  writePosed(9);
+  for (const char* name : {"probe", "logs", "scene"}) {
+    fs::create_directories(options_.out / name);
+    const std::string said = run();
+    EXPECT_TRUE(contains(said, std::string(name) + ": was not made by such a run")) << said;
+    fs::remove_all(options_.out);
+  }
 }
 
 TEST_F(PhotoRuns, OfPosedPhotosTakeTheFileOfPosesAlone) {

@@ -29,6 +29,15 @@ std::string describeFileTime(const fs::path& file) {
 
 std::string describe(const Capture& capture) {
   std::string text = fmt::format("{} points, {} observations\n", capture.points.size(), capture.observations.size());
+  const auto describeMatrix = [&text](const Mat4d& matrix) {
+    for (int i = 0; i < 16; ++i) text += fmt::format(" {}", matrix(i / 4, i % 4));
+    text += "\n";
+  };
+  describeMatrix(capture.sourceFromWorld);
+  if (capture.geo) {
+    text += fmt::format("{} {} {}", capture.geo->latitude, capture.geo->longitude, capture.geo->altitude);
+    describeMatrix(capture.geo->enuFromWorld);
+  }
   for (const Camera& camera : capture.cameras) {
     text += fmt::format("{} {}x{}", static_cast<int>(camera.lens), camera.width, camera.height);
     for (const double parameter : camera.parameters) text += fmt::format(" {}", parameter);
@@ -41,6 +50,10 @@ std::string describe(const Capture& capture) {
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) text += fmt::format(" {}", pose.rotation(i, k));
     for (int i = 0; i < 3; ++i) text += fmt::format(" {}", pose.translation[i]);
+    if (photo.gps) {
+      text += fmt::format(" {} {} {} {}", photo.gps->latitude, photo.gps->longitude, photo.gps->altitude,
+                          photo.gps->relativeAltitude);
+    }
     for (const fs::path& file : {photo.image, photo.mask, photo.depth}) text += " " + describeFileTime(file);
     text += "\n";
   }
@@ -76,7 +89,10 @@ PosedSource::PosedSource(const PhotoRunOptions& options)
     : options_(&options), source_(readSourceCapture(options.photos)) {
   if (!options.masks.empty()) PhotoMasks(options.masks).addTo(source_);
   const Capture& capture = source_.capture;
-  digest_ = describe(capture);
+  std::string flags;
+  for (const bool isInverted : source_.maskIsInverted) flags += isInverted ? '1' : '0';
+  for (const double unit : source_.exrUnit) flags += fmt::format(" {}", unit);
+  digest_ = textDigest(describe(capture) + flags);
   std::vector<int> sides;
   std::vector<int64_t> pixels;
   for (const Photo& photo : capture.photos) {
@@ -98,9 +114,11 @@ PosedSource::PosedSource(const PhotoRunOptions& options)
     pixels.push_back(int64_t{width} * height);
   }
   if (sides.empty()) throw Error(options.photos.string(), "", "no photo of it can be used", "see the warnings above");
-  longerSide_ = upperMedian(sides);
   size_.photos = static_cast<int64_t>(photos_.size());
-  size_.sourcePixels = upperMedian(pixels);
+  size_.photoPixels = size_.sourcePixels = upperMedian(pixels);
+  size_.longerSide = upperMedian(sides);
+  size_.minutes = options.minutes;
+  size_.steps = options.steps;
   size_.heldOut = countHeldOut(source_, options.holdout);
 }
 
@@ -122,9 +140,7 @@ SourceCapture PosedSource::take(const fs::path& poses) {
 
 TrainingNeeds PosedSource::trainingNeeds(int downscale) const {
   TrainingSize size = size_;
-  size.photoPixels = size.sourcePixels / (int64_t{downscale} * downscale);
-  size.minutes = options_->minutes;
-  size.steps = options_->steps;
+  size.photoPixels /= int64_t{downscale} * downscale;
   return planTraining(size, options_->costs);
 }
 

@@ -24,8 +24,8 @@ class PosedSource {
   // A digest of poses, cameras and points, and of the sizes and times of photos, masks and depth maps.
   const std::string& digest() const { return digest_; }
   const std::vector<ListedPhoto>& photos() const { return photos_; }  // names and files alone
-  // The longer side of the photo in the middle, in pixels: of its file, or of its camera where it cannot be read.
-  int longerSide() const { return longerSide_; }
+  // How large the capture is if its photos keep their size; where a photo cannot be read, its camera tells it.
+  const TrainingSize& trainingSize() const { return size_; }
   bool holdsOut() const { return size_.heldOut > 0; }  // whether photos are held out to evaluate on
   TrainingNeeds trainingNeeds(int downscale) const;
 
@@ -37,7 +37,6 @@ class PosedSource {
   std::string digest_;
   std::vector<ListedPhoto> photos_;
   TrainingSize size_;
-  int longerSide_ = 1;
 };
 
 }  // namespace tessera

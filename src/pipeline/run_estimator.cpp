@@ -5,16 +5,13 @@
 
 #include "base/order_statistics.h"
 #include "import/holdout.h"
+#include "pipeline/pairs_json.h"
 
 namespace tessera {
 
 RunEstimator::RunEstimator(const PhotoRunOptions& options, const PhotoList& list, const PhotoMatches& matches,
-                           std::string photosDigest, int downscale)
-    : options_(options),
-      list_(list),
-      matches_(matches),
-      photosDigest_(std::move(photosDigest)),
-      downscale_(downscale) {}
+                           std::string photosDigest)
+    : options_(options), list_(list), matches_(matches), photosDigest_(std::move(photosDigest)) {}
 
 const MatchingRates& RunEstimator::rates() {
   if (rates_) return *rates_;
@@ -35,6 +32,14 @@ const MatchingRates& RunEstimator::rates() {
 // The number of pairs that are compared, as far as it is known before the look-alikes are.
 int64_t RunEstimator::expectedPairs() {
   constexpr double kPairsPerPhoto = 13;  // of look-alikes: they are mutual, and neighbours look alike
+  const fs::path file = options_.out / "poses/pairs.json";
+  std::error_code status;
+  if (expectedPairs_ == 0 && fs::exists(file, status)) {
+    try {
+      expectedPairs_ = static_cast<int64_t>(readPairs(file, list_.photos.size()).pairs.size());
+    } catch (const Error&) {  // of other photos, or damaged: they are chosen anew
+    }
+  }
   if (expectedPairs_ == 0) {
     expectedPairs_ = static_cast<int64_t>(choosePairs(list_, {}).size());
     if (needsLookAlikes(list_))
@@ -65,13 +70,13 @@ StageNeeds RunEstimator::matchNeeds(bool resumes) {
   return needs;
 }
 
-TrainingNeeds RunEstimator::trainingNeeds() {
-  TrainingSize size{.photos = static_cast<int64_t>(list_.photos.size()),
-                    .minutes = options_.minutes,
-                    .steps = options_.steps,
-                    .relativeSeconds = relativeSeconds(rates())};
+const TrainingSize& RunEstimator::trainingSize() {
+  if (trainingSize_) return *trainingSize_;
+  TrainingSize size{
+      .photos = static_cast<int64_t>(list_.photos.size()), .minutes = options_.minutes, .steps = options_.steps};
   std::vector<Photo> photos(list_.photos.size());
   std::vector<int64_t> pixels;
+  std::vector<int> sides;
   for (size_t i = 0; i < photos.size(); ++i) {
     std::error_code status;
     photos[i].name = list_.photos[i].name;
@@ -79,12 +84,21 @@ TrainingNeeds RunEstimator::trainingNeeds() {
     size.sourceBytes += status ? 0 : static_cast<int64_t>(bytes);
     const CameraBody& body = list_.bodies[static_cast<size_t>(list_.photos[i].body)];
     pixels.push_back(int64_t{body.width} * body.height);
+    sides.push_back(std::max(body.width, body.height));
   }
   holdOut(options_.holdout, photos);
   size.heldOut =
       std::count_if(photos.begin(), photos.end(), [](const Photo& photo) { return photo.split == Split::test; });
-  size.sourcePixels = upperMedian(pixels);
-  size.photoPixels = size.sourcePixels / (int64_t{downscale_} * downscale_);
+  size.photoPixels = size.sourcePixels = upperMedian(pixels);
+  size.longerSide = upperMedian(sides);
+  trainingSize_ = size;
+  return *trainingSize_;
+}
+
+TrainingNeeds RunEstimator::trainingNeeds(int downscale) {
+  TrainingSize size = trainingSize();
+  size.photoPixels /= int64_t{downscale} * downscale;
+  size.relativeSeconds = relativeSeconds(rates());
   return planTraining(size, options_.costs);
 }
 

@@ -16,13 +16,19 @@ class RunEstimator {
   // The first three must outlive this object. `photosDigest` tells whether rates that OUT/probe.json has are those of
   // the same photos.
   RunEstimator(const PhotoRunOptions& options, const PhotoList& list, const PhotoMatches& matches,
-               std::string photosDigest, int downscale);
+               std::string photosDigest);
 
   // Measure rates when they are first called. Throw RunInterrupted, and Error as measureMatchingRates and holdOut do.
   MatchingNeeds matchingNeeds();
   StageNeeds featureNeeds(bool resumes);
   StageNeeds matchNeeds(bool resumes);
-  TrainingNeeds trainingNeeds();
+  TrainingNeeds trainingNeeds(int downscale);
+
+  // From now on, the number of pairs is known.
+  void setPairs(size_t pairs) { expectedPairs_ = static_cast<int64_t>(pairs); }
+
+  // How large the capture is if its photos keep their size. Throws Error as holdOut does.
+  const TrainingSize& trainingSize();
 
  private:
   const MatchingRates& rates();
@@ -33,8 +39,8 @@ class RunEstimator {
   const PhotoList& list_;
   const PhotoMatches& matches_;
   std::string photosDigest_;
-  int downscale_;
   std::optional<MatchingRates> rates_;
+  std::optional<TrainingSize> trainingSize_;
   int64_t expectedPairs_ = 0;  // 0: not known yet
 };
 

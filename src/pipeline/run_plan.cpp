@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
@@ -19,9 +20,10 @@ using Seconds = std::chrono::duration<double>;
 using SteadyClock = std::chrono::steady_clock;
 
 constexpr int64_t kMiB = 1 << 20;
+constexpr double kSecondsPerMinute = 60;
 constexpr size_t kProbed = 5;               // photos: ten pairs
 constexpr size_t kFewestToProbe = 15;       // photos: of fewer, a probe is a large part of the task
-constexpr double kFeatureSeconds = 0.2e-3;  // of two cores, for each feature (measured on three sets of photos)
+constexpr double kFeatureSeconds = 1.4e-6;  // of two cores, for the features in a pixel (1.25 and 1.67 were measured)
 
 // The photos of one camera from the middle of those of the most frequent camera.
 PhotoList photosToProbe(const PhotoList& list) {
@@ -52,8 +54,10 @@ MatchingRates probe(const PhotoList& chosen, int threads, const fs::path& folder
   matches.match(pairs, [&](int64_t) { look(); });
   const auto matched = SteadyClock::now();
   const PhotoMatches::Counts counts = matches.count();
+  const CameraBody& body = chosen.bodies[static_cast<size_t>(chosen.photos.front().body)];
   return {.secondsPerPhoto = Seconds(extracted - start).count() / count,
           .secondsPerPair = Seconds(matched - extracted).count() / static_cast<double>(pairs.size()),
+          .pixelsPerPhoto = static_cast<double>(body.width) * body.height,
           .featuresPerPhoto = static_cast<double>(counts.features) / count,
           .inliersPerPair = static_cast<double>(counts.inliers) / static_cast<double>(pairs.size())};
 }
@@ -85,6 +89,7 @@ std::string encodeMatchingRates(const MatchingRates& rates, const std::string& k
   const nlohmann::ordered_json json = {{"of", key},
                                        {"seconds_per_photo", rates.secondsPerPhoto},
                                        {"seconds_per_pair", rates.secondsPerPair},
+                                       {"pixels_per_photo", rates.pixelsPerPhoto},
                                        {"features_per_photo", rates.featuresPerPhoto},
                                        {"inliers_per_pair", rates.inliersPerPair}};
   return json.dump(2) + "\n";
@@ -96,6 +101,7 @@ std::optional<MatchingRates> decodeMatchingRates(const std::string& text, const 
   MatchingRates rates;
   const std::pair<const char*, double*> fields[] = {{"seconds_per_photo", &rates.secondsPerPhoto},
                                                     {"seconds_per_pair", &rates.secondsPerPair},
+                                                    {"pixels_per_photo", &rates.pixelsPerPhoto},
                                                     {"features_per_photo", &rates.featuresPerPhoto},
                                                     {"inliers_per_pair", &rates.inliersPerPair}};
   for (const auto& [name, value] : fields) {
@@ -107,17 +113,19 @@ std::optional<MatchingRates> decodeMatchingRates(const std::string& text, const 
 }
 
 double relativeSeconds(const MatchingRates& rates) {
-  if (rates.featuresPerPhoto < 1) return 1;
-  return std::clamp(rates.secondsPerPhoto / (rates.featuresPerPhoto * kFeatureSeconds), 0.05, 20.0);
+  if (rates.pixelsPerPhoto < 1) return 1;
+  return std::clamp(rates.secondsPerPhoto / (rates.pixelsPerPhoto * kFeatureSeconds), 0.05, 20.0);
 }
 
-// The constants are fitted to three sets of 18 to 202 photos: docs/benchmarks.md, "Photographs without poses".
+// The constants are fitted to four sets of 18 to 487 photos: docs/benchmarks.md, "Photographs without poses". Mapping
+// adjusts all photos again and again: its time follows from their number more closely than from that of the inliers.
 MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates) {
-  constexpr double kSecondsPerInlier = 0.155e-3, kFewestSeconds = 8, kAdjustingPerInlier = 0.027e-3;
+  constexpr double kMapping = 0.187, kMappingGrowth = 1.274, kAdjusting = 0.0243, kAdjustingGrowth = 1.316;
+  constexpr double kMargin = 1.4;        // of inliers and features, for memory, before they are known
   constexpr double kOfNeighbours = 0.6;  // inliers of all pairs, relative to those of neighbours
-  constexpr double kLookAlikeSeconds = 0.45;
+  constexpr double kSecondsPerWordFeature = 0.28e-3, kPhotosForWords = 60, kLookAlikeSeconds = 0.15;
   constexpr int64_t kBytesPerFeature = 155, kBytesPerInlier = 16, kModelBytesPerInlier = 31, kModels = 4;
-  constexpr int64_t kMapperBytesPerInlier = 540, kMapperBytesPerFeature = 110;
+  constexpr int64_t kMapperBytesPerInlier = 560, kMapperBytesPerFeature = 115;
   const double speed = relativeSeconds(rates);
   const auto photos = static_cast<double>(size.photos), pairs = static_cast<double>(size.pairs);
   const double features = size.features > 0 ? static_cast<double>(size.features) : photos * rates.featuresPerPhoto;
@@ -128,14 +136,22 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
   const int extracting = extractionThreads(size.threads, size.pixels, usableMemoryBytes());
   needs.features = {photos * rates.secondsPerPhoto, 32 * kMiB + extractionBytes(extracting, size.pixels),
                     bytes(kBytesPerFeature, features)};
-  needs.lookAlikes = {photos * kLookAlikeSeconds * speed, 64 * kMiB + bytes(kBytesPerFeature, features),
-                      bytes(0.03 * kBytesPerFeature, features)};
-  needs.matches = {pairs * rates.secondsPerPair, 64 * kMiB + bytes(3000, rates.featuresPerPhoto),
+  const double featuresPerPhoto = photos > 0 ? features / photos : 0;
+  needs.lookAlikes = {
+      (kSecondsPerWordFeature * std::min(kPhotosForWords, photos) * featuresPerPhoto + kLookAlikeSeconds * photos) *
+          speed,
+      64 * kMiB + bytes(kBytesPerFeature, features), bytes(0.03 * kBytesPerFeature, features)};
+  // The photos that were tried may have had fewer features than most. Time grows about as their number does.
+  const double tried = rates.featuresPerPhoto < 1 ? 1 : featuresPerPhoto / rates.featuresPerPhoto;
+  needs.matches = {pairs * rates.secondsPerPair * tried, 64 * kMiB + bytes(3000, featuresPerPhoto),
                    bytes(kBytesPerInlier, inliers)};
-  const int64_t mapper = 32 * kMiB + bytes(kMapperBytesPerInlier, inliers) + bytes(kMapperBytesPerFeature, features);
-  needs.mapping = {(kFewestSeconds + kSecondsPerInlier * inliers) * speed, mapper,
+  const double margin = size.inliers > 0 ? 1 : kMargin;
+  const int64_t mapper =
+      32 * kMiB + bytes(kMapperBytesPerInlier, margin * inliers) + bytes(kMapperBytesPerFeature, margin * features);
+  needs.mapping = {kMapping * std::pow(photos, kMappingGrowth) * speed, mapper,
                    bytes(kModelBytesPerInlier * kModels, inliers)};
-  needs.adjusting = {(1 + kAdjustingPerInlier * inliers) * speed, mapper, bytes(kModelBytesPerInlier, inliers)};
+  needs.adjusting = {kAdjusting * std::pow(photos, kAdjustingGrowth) * speed, mapper,
+                     bytes(kModelBytesPerInlier, inliers)};
   return needs;
 }
 
@@ -154,8 +170,8 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
   needs.capture = {
       isReduced ? photos * static_cast<double>(size.sourcePixels) * kImportSeconds * speed : photos * 0.005, 32 * kMiB,
       static_cast<int64_t>(static_cast<double>(size.sourceBytes) * shrunk)};
-  const double training =
-      size.steps > 0 ? static_cast<double>(size.steps) * costs.secondsPerStep * speed : 60 * size.minutes;
+  const double training = size.steps > 0 ? static_cast<double>(size.steps) * costs.secondsPerStep * speed
+                                         : kSecondsPerMinute * size.minutes;
   needs.train = {
       training + kStartAndEnd,
       costs.trainBytes + static_cast<int64_t>(std::min(kBytesPerPixel * pixels * (photos - heldOut),
@@ -168,6 +184,17 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
     needs.evaluate = {kStartAndEnd + heldOut * pixels * 1e-6 * costs.secondsPerRenderedMegapixel * speed,
                       costs.trainBytes / 2, 0};
   return needs;
+}
+
+int chooseDownscale(const TrainingSize& size, const TrainingCosts& costs) {
+  constexpr double kVisits = 3;
+  const double seconds =
+      size.steps > 0 ? static_cast<double>(size.steps) * costs.secondsPerStep : kSecondsPerMinute * size.minutes;
+  const double pixels = static_cast<double>(size.photos - size.heldOut) * static_cast<double>(size.sourcePixels);
+  const int least = (size.longerSide + kLongestSide - 1) / kLongestSide;
+  const int most = std::max(least, size.longerSide / kShortestSide);
+  const double divisor = std::ceil(std::sqrt(kVisits * pixels / (costs.raysPerSecond * seconds)));
+  return static_cast<int>(std::clamp<double>(divisor, std::max(1, least), std::max(1, most)));
 }
 
 std::string describePlan(const RunPlan& plan) {
@@ -199,6 +226,19 @@ void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes,
                     static_cast<double>(entry.needs.memoryBytes) / kGiB, static_cast<double>(memoryBytes) / kGiB),
         "raise --downscale if it is `train`, else use fewer photos; or use a machine with more memory");
   }
+}
+
+void announcePlan(const RunPlan& plan, const fs::path& folder) {
+  constexpr double kGiB = 1 << 30, kGigabyte = 1e9, kLongSeconds = 30;
+  const StageNeeds total = plan.total();
+  if (total.seconds > kLongSeconds) {
+    inform("this will take about {}, up to {:.1f} GiB of memory and {:.2f} GB of disk", describeDuration(total.seconds),
+           static_cast<double>(total.memoryBytes) / kGiB, static_cast<double>(total.diskBytes) / kGigabyte);
+  }
+  std::error_code status;
+  const auto space = fs::space(folder, status);
+  constexpr int64_t kUnknown = std::numeric_limits<int64_t>::max();
+  requireRoom(plan, folder, status ? kUnknown : static_cast<int64_t>(space.available), usableMemoryBytes());
 }
 
 }  // namespace tessera

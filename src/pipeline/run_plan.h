@@ -18,6 +18,7 @@ namespace tessera {
 struct MatchingRates {
   double secondsPerPhoto = 0.8;    // features
   double secondsPerPair = 0.3;     // matches
+  double pixelsPerPhoto = 480000;  // of the photos that were tried
   double featuresPerPhoto = 4000;  // mean
   double inliersPerPair = 400;     // mean of neighbours
 };
@@ -53,6 +54,7 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
 // scenes.
 struct TrainingCosts {
   double secondsPerStep = 0.2;
+  double raysPerSecond = 20000;
   double bakeSeconds = 20;                 // whatever the photos, and
   double secondsPerBakedMegapixel = 1;     // of the training photos
   double secondsPerRenderedMegapixel = 1;  // of the photos held out
@@ -64,7 +66,8 @@ struct TrainingCosts {
 struct TrainingSize {
   int64_t photos = 0, heldOut = 0;
   int64_t photoPixels = 0;     // of one photo of the capture
-  int64_t sourcePixels = 0;    // of one photo as it was taken
+  int64_t sourcePixels = 0;    // of one photo as it was taken, whose
+  int longerSide = 0;          // has so many
   int64_t sourceBytes = 0;     // on disk, of all photos
   double minutes = 0;          // of training; or
   int64_t steps = 0;           // steps, if above 0
@@ -76,12 +79,22 @@ struct TrainingNeeds {
 };
 TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs);
 
+inline constexpr int kLongestSide = 1600, kShortestSide = 400;  // pixels of the longer side of a photo
+
+// Returns by what width and height of photos are divided so that training, with the usual number of rays a second,
+// passes kVisits times through each pixel: at least until the longer side has at most kLongestSide pixels, and at most
+// until it has kShortestSide. The machine has no influence, so that a run that is repeated gives the same photos.
+int chooseDownscale(const TrainingSize& size, const TrainingCosts& costs);
+
 // Returns a plan as a table, a line for each stage and one for all.
 std::string describePlan(const RunPlan& plan);
 
 // Throws Error, with a remedy, if a plan takes more disk than is free where `folder` is, or a stage more memory than
 // there is.
 void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes, int64_t memoryBytes);
+
+// States what a plan takes, if that is long, and refuses what does not fit, as requireRoom.
+void announcePlan(const RunPlan& plan, const fs::path& folder);
 
 // How many seconds this machine takes for what two cores do in one, by its rates.
 double relativeSeconds(const MatchingRates& rates);

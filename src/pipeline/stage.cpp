@@ -43,7 +43,9 @@ std::vector<std::pair<std::string, Record>> readRecords(const fs::path& file, st
       return stage.contains(key) && stage[key].is_string() ? stage[key].get<std::string>() : std::string();
     };
     const auto number = [&](const char* key) {
-      return stage.contains(key) && stage[key].is_number() ? stage[key].get<double>() : 0.0;
+      constexpr double kMaxNumber = 1e18;  // that any of these numbers can mean
+      const double value = stage.contains(key) && stage[key].is_number() ? stage[key].get<double>() : 0.0;
+      return value >= 0 && value < kMaxNumber ? value : 0.0;
     };
     entry.digest = text("digest");
     entry.summary = text("summary");
@@ -164,6 +166,11 @@ std::vector<StageRecord> readStageRecords(const fs::path& folder) {
   return stages;
 }
 
+void claimFolder(const fs::path& folder) {
+  std::error_code status;
+  if (!fs::exists(folder / kRecord, status)) write({{"version", 1}, {"stages", Json::array()}}, folder / kRecord);
+}
+
 std::string textDigest(const std::string& text) {
   uint64_t hash = 0xcbf29ce484222325;
   for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3;
@@ -180,8 +187,10 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
   const fs::path file = folder / kRecord;
   Json run = {{"version", 1}, {"request", request}, {"stages", Json::array()}};
   if (!range.from.empty()) run["begun_from"] = range.from;
-  const StageNeeds total = planRemaining(stages, remaining).total();
-  run["expected"] = {{"seconds", total.seconds}, {"peak_bytes", total.memoryBytes}, {"disk_bytes", total.diskBytes}};
+  const auto record = [&run](const StageNeeds& total) {
+    run["expected"] = {{"seconds", total.seconds}, {"peak_bytes", total.memoryBytes}, {"disk_bytes", total.diskBytes}};
+  };
+  record(planRemaining(stages, remaining).total());
   for (size_t i = 0; i < remaining.first; ++i) {
     fmt::print("{:<10} finished before: {}\n", stages[i].name, remaining.known[i].summary);
     run["stages"].push_back(toJson(stages[i].name, remaining.known[i]));
@@ -207,8 +216,13 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
     result.summary = outcome.summary;
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     result.peakBytes = std::max(outcome.peakBytes, residentBytes());
-    double left = 0;
-    for (size_t later = i + 1; later < remaining.end; ++later) left += stages[later].needs(false).seconds;
+    RunPlan later;
+    for (size_t k = i + 1; k < remaining.end; ++k) later.entries.push_back({stages[k].name, stages[k].needs(false)});
+    const double left = later.total().seconds;
+    if (stage.revealsNeeds) {
+      later.entries.push_back({stage.name, {result.seconds, result.peakBytes, 0}});
+      record(later.total());
+    }
     fmt::print("{:<10} {}: {}{}\n", stage.name, describeClock(result.seconds), result.summary,
                left > kLongSeconds ? fmt::format(" (about {} left)", describeDuration(left)) : "");
     std::fflush(stdout);

@@ -31,6 +31,8 @@ struct Stage {
   std::function<void()> discard = [] {};
   // What it will take, by what is known when this is called.
   std::function<StageNeeds(bool resumes)> needs = [](bool) { return StageNeeds{}; };
+  // Whether what later stages need is only known after it: run.json then records what they are expected to take.
+  bool revealsNeeds = false;
   // `resumes`: it was interrupted, and nothing that its result depends on has changed since: what it has written so far
   // may be used.
   std::function<StageOutcome(bool resumes)> run;
@@ -71,6 +73,9 @@ RunPlan planStages(const fs::path& folder, const std::vector<Stage>& stages, con
 void runStages(
     const fs::path& folder, const std::string& request, const std::vector<Stage>& stages, const StageRange& range,
     const std::function<void()>& check = [] {});
+
+// Writes a run.json without stages if the folder has none: what is made in the folder from now on is a run's.
+void claimFolder(const fs::path& folder);
 
 // Returns the finished stages of a run in this folder; to a stage that runs, those before it. Nothing if run.json is
 // missing or damaged.

@@ -175,7 +175,9 @@ TEST_F(Stages, ReadWhatIsRecordedOfThoseBeforeThem) {
 
 TEST_F(Stages, SurviveADamagedRecord) {
   run({"", "", ""});
-  for (const char* text : {"", "{", "[]", "{\"stages\": 3}", "{\"stages\": [1, {\"name\": 2}, {\"name\": \"one\"}]}"}) {
+  for (const char* text :
+       {"", "{", "[]", "{\"stages\": 3}", "{\"stages\": [{\"name\": \"one\", \"peak_bytes\": 1e300, \"seconds\": -1}]}",
+        "{\"stages\": [1, {\"name\": 2}, {\"name\": \"one\"}]}"}) {
     writeFileAtomically(folder_ / "run.json", text);
     EXPECT_EQ(run({"", "", ""}), "one two three ") << text;
   }
@@ -232,6 +234,19 @@ TEST(StagePlan, IsRecordedBeforeTheFirstStageAndForEach) {
   EXPECT_NE(record.find("\"expected_seconds\": 60"), record.npos) << record;
   EXPECT_NE(printed.find("one        0:00: done (about 2 min left)"), printed.npos) << printed;
   EXPECT_NE(printed.find("three      0:00: done\n"), printed.npos) << printed;
+}
+
+TEST(StagePlan, IsRecordedAnewAfterAStageThatRevealsIt) {
+  const TemporaryFolder folder;
+  bool isKnown = false;
+  std::vector<Stage> stages = minutesEach([&](const std::string&) { isKnown = true; });
+  for (Stage& stage : stages)
+    stage.needs = [&isKnown](bool) { return isKnown ? StageNeeds{60, 1000, 7} : StageNeeds{}; };
+  stages[0].revealsNeeds = true;
+  runStages(folder.path(), "test", stages, {});
+  const std::string record = readTextFile(folder / "run.json");
+  EXPECT_NE(record.find("\"seconds\": 120"), record.npos) << record;
+  EXPECT_NE(record.find("\"disk_bytes\": 14"), record.npos) << record;
 }
 
 TEST(StagePlan, HasDurationsForPeople) {

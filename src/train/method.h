@@ -107,6 +107,7 @@ using BakeParameters = std::map<std::string, int64_t, std::less<>>;  // by name;
 // `mesh` on one of 72 photos of 400×300 in four blocks.
 struct MethodCosts {
   double secondsPerStep = 0;
+  double raysPerSecond = 0;                // while it trains
   double bakeSeconds = 0;                  // whatever the photos, and
   double secondsPerBakedMegapixel = 0;     // of the training photos
   double secondsPerRenderedMegapixel = 0;  // on the CPU

@@ -83,7 +83,7 @@ const Method& meshMethod() {
       .summary = "triangles whose colours a small network decodes (UE4-NeRF)",
       .trainsInBlocks = true,
       .partsAlone = true,
-      .costs = {0.06, 50, 1, 2, int64_t{1400} << 20, 2400000000},
+      .costs = {0.06, 45000, 50, 1, 2, int64_t{1400} << 20, 2400000000},
       .settings = makeSettings<MeshConfig>,
       .train = train,
       .openModel = openModel,

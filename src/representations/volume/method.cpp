@@ -58,7 +58,7 @@ const Method& volumeMethod() {
       .summary = "texels of blocks in sparse voxels and planes, shaded once a pixel (City-on-Web, MERF)",
       .trainsInBlocks = true,
       .swapsBlocks = true,
-      .costs = {0.07, 16, 1, 5, int64_t{700} << 20, 120000000},
+      .costs = {0.07, 40000, 16, 1, 5, int64_t{700} << 20, 120000000},
       .settings = makeSettings<VolumeConfig>,
       .train = train,
       .openModel = openModel,
