@@ -5,6 +5,7 @@
 #   survey    a survey of a city of 2x2 blocks in 202 photographs of 800x600, GPS errors of 2 m and 0.5 m, one flight 15 m too high:
 #             at least 98 % get poses; after the best similarity to the true ones 0.1 m, 0.05 degrees (medians, without a pose:
 #             infinite) and 0.5 m (worst); scale, rotation and middle from GPS within twice the predicted standard errors
+#   served    brighton_beach from photographs to the first tiles that a browser gets, in at most 25 minutes
 #   exposure  brighton_beach at 400x225, ten minutes of `field`: exposures predicted from EXIF at least 0.4 dB above neutral, and on
 #             the right halves of the views at most 0.2 dB below fitted ones
 #   killed    brighton_beach to an evaluated scene of `volume`, killed 20 times, at least once in each stage: all photos get poses, at most
@@ -15,12 +16,12 @@
 #   reduced   by what photographs are best divided for ten minutes of training: 1, 2 and 4, judged in views divided by 2
 #   jitter    a city whose photographs differ by half a stop: a model of it, compared with the held-out views of the same city without
 #             these differences, at most 0.3 dB below a model of that one; with the exposures of EXIF shuffled, too
-#   sizes     surveys of cities of 1x2 and 3x3 blocks with an overlap of 77 %, 116 and 487 photographs of 800x600: minutes and memory of
+#   sizes     surveys of cities of 1x2 and 3x3 blocks with an overlap of 77 %, 122 and 487 photographs of 800x600: minutes and memory of
 #             each stage up to georeferenced poses, the larger one in at most 90 minutes, and at most 1.5 times as long for each photo
 #   untagged  the same photographs as in survey, without EXIF and XMP: at least 95 % get poses, none more than 1 m off
 # Of each run: its time within twice what it had expected at the start, stages within 1.5 times, memory between half and all of it.
 # Resumable: everything is kept in build/bench/photos, and what exists is not made again.
-#   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox against methods reduced exposure jitter killed survey sizes untagged"] \
+#   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox served against methods reduced exposure jitter killed survey sizes untagged"] \
 #     [SEEDS="1 2 3"] [MINUTES=10] [METHOD=mesh] bench/photos.sh
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
@@ -59,6 +60,26 @@ brighton() {
 fox() {
   posed fox "$data/fox/images"
   verdict "fox, photos with poses of 50" "$(registered fox)" '>=' 49
+}
+
+# Tiles are asked for as soon as the address is printed; the viewer draws the coarsest ones at once.
+served() {
+  local began=$SECONDS log=$work/served.log address run
+  rm -rf "$work/served"
+  "$tessera" run "$data/brighton_beach/images" "$work/served" --serve 0 > "$log" 2>&1 &
+  run=$!
+  until grep -q "open http" "$log"; do
+    kill -0 "$run" 2> /dev/null || die "$log: $(tail -1 "$log")"
+    sleep 1
+  done
+  address=$(grep -o "http://[^ ]*" "$log")
+  curl -sSf "${address}scene/tileset.json" | jq -r '.. | .uri? // empty' | head -1 > "$work/served.tile"
+  curl -sSf "${address}scene/$(cat "$work/served.tile")" > /dev/null
+  verdict "brighton_beach, minutes to the first tile" "$(jq -n "($SECONDS - $began) / 60")" '<=' 25
+  kill -INT "$run"
+  wait "$run"
+  planned served
+  echo "brighton_beach, held-out PSNR: $(jq .psnr "$work/served/eval.json") dB"
 }
 
 # scene_of CAPTURE METHOD SEED VIEWS: trains, bakes, and compares the scene with the held-out photographs of the capture VIEWS;
@@ -279,5 +300,5 @@ killed() {
     "$(diff -rq "$work/killed/scene" "$work/again/scene" 2>&1 | wc -l)" '<=' 0
 }
 
-for row in ${ROWS:-brighton fox against methods reduced exposure jitter killed survey sizes untagged}; do "$row"; done
+for row in ${ROWS:-brighton fox served against methods reduced exposure jitter killed survey sizes untagged}; do "$row"; done
 finish
