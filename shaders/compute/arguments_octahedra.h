@@ -40,8 +40,8 @@ struct TraceOctahedraArguments {
   FloatPointer positions;
   FloatPointer distances;
   OctahedraGridArguments grids[6];
-  // reachingFaces(): from the lowest bits on, 2 bits each for the octahedron's x + 1, y + 1 and z + 1, then the local
-  // number.
+  // reachingFaces(): from the lowest bits on, 2 bits each for the octahedron's x + 1, y + 1 and z + 1, 5 bits for the
+  // local number, and 5 bits for the cell of each corner, x + 1 + 3 (y + 1) + 9 (z + 1).
   uint faces[2 * 112];
 };
 TESSERA_SIZE(TraceOctahedraArguments, 1704);

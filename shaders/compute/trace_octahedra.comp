@@ -11,7 +11,7 @@
 #include "real.glsl"
 #include "vectors.glsl"
 
-layout(local_size_x = 64) in;
+layout(local_size_x = 32) in;  // small, because of the shared memory
 layout(constant_id = 0) const bool kWrite = false;
 KERNEL_ARGUMENTS(TraceOctahedraArguments)
 
@@ -81,6 +81,33 @@ bool isOccupied(uint grid, ivec3 cell) {
   return (PARAMETERS.occupancy.values[grid * ((n * n * n + 31) / 32) + i / 32] >> i % 32 & 1) != 0;
 }
 
+// The vertices of the 27 cells around a ray's cell, relative to the point at which it enters the cell, and sheared so that
+// the ray is the z axis. Each invocation has its own column.
+const uint kCornerCells = 27;
+shared float corners[3 * kCornerCells * gl_WorkGroupSize.x];
+
+vec3 cornerAt(uint number) {
+  const uint first = 3 * number * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+  return vec3(corners[first], corners[first + gl_WorkGroupSize.x], corners[first + 2 * gl_WorkGroupSize.x]);
+}
+
+// Fills in the vertices of a cell; returns a bit for each that exists. `shear`: of x and y, and the sign of z.
+uint placeCorners(Ray ray, ivec3 cell, vec3 origin, vec3 shear) {
+  const int n = int(PARAMETERS.resolution), x = (ray.z + 1) % 3, y = (ray.z + 2) % 3;
+  uint placed = 0;
+  for (uint number = 0; number < kCornerCells; ++number) {
+    const ivec3 offset = ivec3(number % 3, number / 3 % 3, number / 9) - 1, place = cell + offset;
+    if (any(lessThan(place, ivec3(0))) || any(greaterThanEqual(place, ivec3(n)))) continue;
+    placed |= 1u << number;
+    const vec3 at = vec3(offset) + pointAt(PARAMETERS.displacements, ray.firstCell + place.x + n * (place.y + n * place.z)) - origin;
+    const uint first = 3 * number * gl_WorkGroupSize.x + gl_LocalInvocationIndex;
+    corners[first] = at[x] - shear.x * at[ray.z];
+    corners[first + gl_WorkGroupSize.x] = at[y] - shear.y * at[ray.z];
+    corners[first + 2 * gl_WorkGroupSize.x] = at[ray.z] * shear.z;
+  }
+  return placed;
+}
+
 // Finds the hits of a cell that the ray crosses from s = `enter` to `leave`, writes those that fit, and adds their number
 // to `count`. Returns false if the ray has all that it may have.
 bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
@@ -88,23 +115,15 @@ bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
   const vec3 step_ = vec3(ray.step_), origin = vec3(ray.entry + enter * ray.step_ - (realVec3(cell) + real(0.5)));
   const float shearX = step_[x] / step_[ray.z], shearY = step_[y] / step_[ray.z], sign_ = step_[ray.z] > 0 ? 1 : -1;
   const uint table = PARAMETERS.faceCount * ((cell.x + cell.y + cell.z) & 1);
+  const uint placed = placeCorners(ray, cell, origin, vec3(shearX, shearY, sign_));
   Hit hits[kMaxHitsInCell];
   uint hitCount = 0;
   for (uint f = 0; f < PARAMETERS.faceCount; ++f) {
-    const uint packed = PARAMETERS.faces[table + f], local = packed >> 6;
-    const ivec3 octahedron = cell + ivec3(packed & 3, packed >> 2 & 3, packed >> 4 & 3) - 1;
-    vec3 v[3];  // sheared so that the ray is the z axis
-    bool exists = true;
-    for (uint corner = 0; corner < 3; ++corner) {
-      const ivec3 place = octahedron + faceCorner(local, corner);
-      if (any(lessThan(place, ivec3(0))) || any(greaterThanEqual(place, ivec3(n)))) {
-        exists = false;
-        break;
-      }
-      const vec3 at = vec3(place - cell) + pointAt(PARAMETERS.displacements, ray.firstCell + place.x + n * (place.y + n * place.z)) - origin;
-      v[corner] = vec3(at[x] - shearX * at[ray.z], at[y] - shearY * at[ray.z], at[ray.z] * sign_);
-    }
-    if (!exists) continue;
+    const uint packed = PARAMETERS.faces[table + f];
+    const uint places = 1u << (packed >> 11 & 31) | 1u << (packed >> 16 & 31) | 1u << (packed >> 21 & 31);
+    if ((placed & places) != places) continue;
+    vec3 v[3];
+    for (uint corner = 0; corner < 3; ++corner) v[corner] = cornerAt(packed >> (11 + 5 * corner) & 31);
     const vec3 areas = vec3(v[1].x * v[2].y - v[1].y * v[2].x, v[2].x * v[0].y - v[2].y * v[0].x,
                             v[0].x * v[1].y - v[0].y * v[1].x);
     const float sum = areas.x + areas.y + areas.z;
@@ -115,19 +134,27 @@ bool addHits(Ray ray, ivec3 cell, real enter, real leave, inout uint count) {
     const real t_ = ray.entry[ray.z] + (enter + s) * ray.step_[ray.z];
     const real t = (t_ * ray.start[3] - ray.start[ray.z]) / (ray.slope[ray.z] - t_ * ray.slope[3]);
     if (!(t > ray.near && t < ray.far)) continue;
+    const ivec3 octahedron = cell + ivec3(packed & 3, packed >> 2 & 3, packed >> 4 & 3) - 1;
+    const uint local = packed >> 6 & 31;
     const uint face = (ray.firstCell + octahedron.x + n * (octahedron.y + n * octahedron.z)) * kFacesPerCell + local;
     if (IS_SET(PARAMETERS.keptFaces) && (PARAMETERS.keptFaces.values[face / 32] >> face % 32 & 1) == 0) continue;
-    uint place = min(hitCount, kMaxHitsInCell - 1);
-    if (hitCount == kMaxHitsInCell && s >= hits[place].s) continue;
-    for (; place > 0 && (s < hits[place - 1].s || (s == hits[place - 1].s && face < hits[place - 1].face)); --place) {
-      hits[place] = hits[place - 1];
+    if (kWrite) {
+      uint place = min(hitCount, kMaxHitsInCell - 1);
+      if (hitCount == kMaxHitsInCell && s >= hits[place].s) continue;
+      for (; place > 0 && (s < hits[place - 1].s || (s == hits[place - 1].s && face < hits[place - 1].face)); --place) {
+        hits[place] = hits[place - 1];
+      }
+      hits[place] = Hit(s, face, areas.yz / sum);
     }
-    hits[place] = Hit(s, face, areas.yz / sum);
     hitCount = min(hitCount + 1, kMaxHitsInCell);
+  }
+  if (!kWrite) {
+    count = min(count + hitCount, PARAMETERS.maximum);
+    return count < PARAMETERS.maximum;
   }
   for (uint i = 0; i < hitCount; ++i) {
     const uint row = ray.row + count;
-    if (kWrite && row < ray.endRow) {
+    if (row < ray.endRow) {
       const realVec3 g = ray.entry + (enter + hits[i].s) * ray.step_;
       const real t = (g[ray.z] * ray.start[3] - ray.start[ray.z]) / (ray.slope[ray.z] - g[ray.z] * ray.slope[3]);
       if (IS_SET(PARAMETERS.rayOfSample)) PARAMETERS.rayOfSample.values[row] = ray.index;
@@ -163,6 +190,20 @@ Ray rayInGrid(uint grid, vec3 origin, vec3 direction, real near, real far) {
   return ray;
 }
 
+// Continues a walk at s = `s`: enters the cell behind the nearest of the walls that the ray meets at `next`. Returns false
+// if there is none.
+bool enterNextCell(Ray ray, inout ivec3 cell, inout realVec3 next, inout real s) {
+  const int n = int(PARAMETERS.resolution);
+  int axis = next.y < next.x ? 1 : 0;
+  if (next.z < next[axis]) axis = 2;
+  s = max(s, next[axis]);
+  const bool ascends = ray.step_[axis] > 0;
+  cell[axis] += ascends ? 1 : -1;
+  if (cell[axis] < 0 || cell[axis] >= n) return false;
+  next[axis] = (cell[axis] + (ascends ? 1 : 0) - ray.entry[axis]) / ray.step_[axis];
+  return true;
+}
+
 // Walks through the cells of a grid. Returns false if the ray has all hits that it may have.
 bool walk(Ray ray, inout uint count) {
   const int n = int(PARAMETERS.resolution);
@@ -191,15 +232,17 @@ bool walk(Ray ray, inout uint count) {
   const real last = abs(coordinateAt(ray, ray.far, ray.z) - ray.entry[ray.z]);
   real s = 0;
   for (;;) {
-    int axis = next.y < next.x ? 1 : 0;
-    if (next.z < next[axis]) axis = 2;
-    const real leave = next[axis];
-    if (isOccupied(ray.grid, cell) && !addHits(ray, cell, s, leave, count)) return false;
-    if (!(leave < last)) return true;
-    s = max(s, leave);
-    cell[axis] += ray.step_[axis] > 0 ? 1 : -1;
-    if (cell[axis] < 0 || cell[axis] >= n) return true;
-    next[axis] = (cell[axis] + (ray.step_[axis] > 0 ? 1 : 0) - ray.entry[axis]) / ray.step_[axis];
+    // Each ray goes on to its next occupied cell before any is tested against faces, so that neighbouring invocations
+    // do so together.
+    real leave = min(min(next.x, next.y), next.z);
+    bool occupied = isOccupied(ray.grid, cell);
+    while (!occupied && leave < last) {
+      if (!enterNextCell(ray, cell, next, s)) return true;
+      leave = min(min(next.x, next.y), next.z);
+      occupied = isOccupied(ray.grid, cell);
+    }
+    if (occupied && !addHits(ray, cell, s, leave, count)) return false;
+    if (!(leave < last) || !enterNextCell(ray, cell, next, s)) return true;
   }
 }
 

@@ -16,6 +16,7 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kOctahedraRowsPerGroup = 64;  // local_size_x of the kernels
+constexpr uint32_t kTracedRaysPerGroup = 32;     // of trace_octahedra.comp
 
 void copyGrids(OctahedraGrids grids, arguments::OctahedraGridArguments* to) {
   CHECK((grids.size() >= 1u && grids.size() <= kMaxOctahedraGrids));
@@ -68,10 +69,18 @@ void VulkanDevice::enqueue(const TraceOctahedra& options) {
     for (const ReachingFace& face : faces) {
       *to = face.local << 6;
       for (int axis = 0; axis < 3; ++axis) *to |= static_cast<uint32_t>(face.octahedron[axis] + 1) << 2 * axis;
+      int shift = 11;
+      for (const auto& corner : octahedronFace(face.local)) {
+        uint32_t number = 0;
+        for (int axis = 2; axis >= 0; --axis)
+          number = 3 * number + static_cast<uint32_t>(face.octahedron[axis] + corner[axis] + 1);
+        *to |= number << shift;
+        shift += 5;
+      }
       ++to;
     }
   }
-  const Groups all = {atLeastOneGroup(options.rays.capacity, kOctahedraRowsPerGroup)};
+  const Groups all = {atLeastOneGroup(options.rays.capacity, kTracedRaysPerGroup)};
   queue(realKernel(kTraceOctahedraFloat64Spirv, kTraceOctahedraSpirv, {false}), arguments, all);
   queueRunningSums(
       {options.rays, scratch.counts, arguments.sampleCount, scratch.fitting, options.sampleCapacity, scratch.partials});
