@@ -5,6 +5,11 @@
 
 namespace tessera {
 
+ImageBatch ImageBatch::on(const Device& device) {
+  const bool isGpu = device.ownMemory().bytes > 0;
+  return isGpu ? ImageBatch{1 << 14, 1 << 18} : ImageBatch{};
+}
+
 ImageRays::ImageRays(Device& device, uint32_t maxRays)
     : device_(device),
       maxRays_(maxRays),

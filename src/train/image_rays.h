@@ -21,6 +21,15 @@ struct PixelLattice {
   size_t count() const { return columns() * rows(); }
 };
 
+// The most rays of an image, and the most of their samples, that a renderer evaluates at a time; rays whose samples do
+// not fit are in its next batch. A GPU needs more of them than a CPU before all its units are busy.
+struct ImageBatch {
+  static constexpr uint32_t kLeastSamples = 1 << 16;
+  uint32_t rays = 1 << 12, samples = kLeastSamples;
+
+  static ImageBatch on(const Device& device);
+};
+
 class ImageRays {
  public:
   // Pieces have at most `maxRays` rays. Keeps a reference to `device`.

@@ -8,9 +8,7 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRays = 4096;        // maximum in one batch of the image's rays
-constexpr uint32_t kSamples = 1 << 16;  // rays whose samples do not fit are rendered in the next batch
-static_assert(kSamples >= FieldConfig::kMaxSteps);
+static_assert(ImageBatch::kLeastSamples >= FieldConfig::kMaxSteps);  // so that the samples of any ray fit
 
 }  // namespace
 
@@ -68,14 +66,15 @@ class FieldRenderer::SeenCells final : public PixelVisitor {
   CullOptions options_;
 };
 
-FieldRenderer::FieldRenderer(FieldModel& model) : model_(model), imageRays_(model.device(), kRays) {
+FieldRenderer::FieldRenderer(FieldModel& model)
+    : model_(model), batch_(ImageBatch::on(model.device())), imageRays_(model.device(), batch_.rays) {
   Device& device = model.device();
-  seen_ = RaySamples(device, kRays, kSamples);
+  seen_ = RaySamples(device, batch_.rays, batch_.samples);
   counters_ = device.array<uint32_t>(RaySamples::kCounters);
   seen_.counters = counters_;
-  colour_ = device.array<float>(kRays * 3);
-  for (Array<float>* perRay : {&opacity_, &depth_}) *perRay = device.array<float>(kRays);
-  weights_ = device.array<float>(kSamples);
+  colour_ = device.array<float>(size_t{3} * batch_.rays);
+  for (Array<float>* perRay : {&opacity_, &depth_}) *perRay = device.array<float>(batch_.rays);
+  weights_ = device.array<float>(batch_.samples);
 }
 
 std::string FieldRenderer::device() const {
@@ -108,7 +107,7 @@ RoundCounts FieldRenderer::renderPiece(const ImageRays::Piece& piece) {
 void FieldRenderer::cullUnseen(const Capture& capture, const CullOptions& options,
                                const std::function<void(int64_t done, int64_t all)>& onPhoto) {
   SeenCells seen(*this, options);
-  PhotoVisitor(capture, model_.frame(), kRays, seen).visitAll(options.stride, {}, onPhoto);
+  PhotoVisitor(capture, model_.frame(), batch_.rays, seen).visitAll(options.stride, {}, onPhoto);
   const auto cells = static_cast<uint32_t>(model_.space().gridResolution);
   for (int i = 0; i < options.dilation; ++i) seen.marked = dilateCells(seen.marked, cells);
   std::vector<uint32_t> bits = model_.occupancy().bitWords();
@@ -121,7 +120,7 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
   imageRays_.begin(makeRayCamera(camera, worldFromCamera, model_.frame()), model_.frame(), PixelLattice::whole(camera),
                    opaqueDepth);
   RenderedView view = makeEmptyView(camera);
-  imageRays_.renderInPieces(kSamples, [&](const ImageRays::Piece& piece, size_t first) {
+  imageRays_.renderInPieces(batch_.samples, [&](const ImageRays::Piece& piece, size_t first) {
     const RoundCounts counts = renderPiece(piece);
     const uint32_t finished = counts.finished;
     const std::vector<float> colour = device.read(colour_.part(0, size_t{finished} * 3));
@@ -131,7 +130,7 @@ RenderedView FieldRenderer::render(const Camera& camera, const Pose& worldFromCa
     std::copy(opacity.begin(), opacity.end(), view.opacity.pixels.begin() + static_cast<ptrdiff_t>(first));
     for (uint32_t ray = 0; ray < finished; ++ray)
       view.depth.pixels[first + ray] = imageRays_.toViewDepth(ray, depth[ray]);
-    // Each round of marching, and the set of visible samples, has a capacity of kSamples.
+    // Each round of marching, and the set of visible samples, has the same capacity.
     return ImageRays::Rendered{finished, static_cast<uint32_t>(counts.fullest)};
   });
   return view;

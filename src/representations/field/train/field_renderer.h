@@ -40,6 +40,7 @@ class FieldRenderer final : public ViewRenderer {
 
   FieldModel& model_;
   uint64_t densities_ = 0, colours_ = 0;
+  ImageBatch batch_;
   ImageRays imageRays_;
   RaySamples seen_;
   Array<uint32_t> seenCells_;  // after cullUnseen: as OccupancyGrid::bits

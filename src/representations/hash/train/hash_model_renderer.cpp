@@ -6,20 +6,21 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRays = 4096;        // maximum in one batch of the image's rays
-constexpr uint32_t kSamples = 1 << 16;  // rays whose samples do not fit are rendered in the next batch
-static_assert(kSamples >= HashModel::kMaxSteps);
+static_assert(ImageBatch::kLeastSamples >= HashModel::kMaxSteps);  // so that the samples of any ray fit
 constexpr float kDrawingMinTransmittance = 2e-3f;
 
 // The capacity is sufficient for every corner of every sample, so that no image lacks any.
-HashPipeline::Capacity capacity() {
-  return {kRays, kSamples, 8 * kSamples, false};
+HashPipeline::Capacity capacity(const ImageBatch& batch) {
+  return {batch.rays, batch.samples, 8 * batch.samples, false};
 }
 
 }  // namespace
 
 HashModelRenderer::HashModelRenderer(HashModel& model)
-    : model_(model), pipeline_(model, capacity()), imageRays_(model.device(), kRays) {}
+    : model_(model),
+      batch_(ImageBatch::on(model.device())),
+      pipeline_(model, capacity(batch_)),
+      imageRays_(model.device(), batch_.rays) {}
 
 std::string HashModelRenderer::device() const {
   return model_.device().name();
@@ -31,7 +32,7 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
                    opaqueDepth);
   RenderedView view = makeEmptyView(camera);
   const bool learned = model_.config().background == "learned";
-  imageRays_.renderInPieces(kSamples, [&](const ImageRays::Piece& piece, size_t first) {
+  imageRays_.renderInPieces(batch_.samples, [&](const ImageRays::Piece& piece, size_t first) {
     const HashModel::Rays rays{piece.rays, piece.origins, piece.directions, {}, {}, piece.far};
     pipeline_.forward(rays, kDrawingMinTransmittance);
     const RoundCounts counts(device.read(pipeline_.counters()), HashSamples::kRounds);
@@ -50,7 +51,7 @@ RenderedView HashModelRenderer::render(const Camera& camera, const Pose& worldFr
       const float seenDepth = isOpaque ? depth[ray] / std::max(opacity[ray], 1e-6f) : depth[ray];
       view.depth.pixels[pixel] = imageRays_.toViewDepth(ray, seenDepth);
     }
-    // Each round of marching, and the set of visible samples, has a capacity of kSamples.
+    // Each round of marching, and the set of visible samples, has the same capacity.
     return ImageRays::Rendered{finished, static_cast<uint32_t>(counts.fullest)};
   });
   return view;

@@ -18,6 +18,7 @@ class HashModelRenderer final : public ViewRenderer {
 
  private:
   HashModel& model_;
+  ImageBatch batch_;
   HashPipeline pipeline_;
   ImageRays imageRays_;
 };

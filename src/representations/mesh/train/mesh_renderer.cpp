@@ -9,8 +9,6 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kRays = 4096;        // maximum in one batch of the image's rays
-constexpr uint32_t kSamples = 1 << 16;  // rays whose hits do not fit are rendered in the next batch
 constexpr uint32_t kMaxHits = 1 << 12;  // of a ray
 constexpr float kMinTransmittance = 1e-3f;
 
@@ -42,15 +40,16 @@ void addSky(RenderedView& view, const ImageF& colours, const ImageF* opaqueDepth
 MeshPartRenderer::MeshPartRenderer(MeshModel& model, uint32_t level)
     : model_(model),
       level_(level),
-      imageRays_(model.device(), kRays),
-      hits_(model.device(), kRays, kSamples),
+      batch_(ImageBatch::on(model.device())),
+      imageRays_(model.device(), batch_.rays),
+      hits_(model.device(), batch_.rays, batch_.samples),
       counters_(model.device().array<uint32_t>(MeshHits::kCounters)) {
   Device& device = model.device();
   hits_.counters = counters_;
-  model.field().reserve(kSamples);
-  for (Array<float>* perRay : {&colour_, &sky_}) *perRay = device.array<float>(kRays * 3);
-  for (Array<float>* perRay : {&opacity_, &depth_}) *perRay = device.array<float>(kRays);
-  weights_ = device.array<float>(kSamples);
+  model.field().reserve(batch_.samples);
+  for (Array<float>* perRay : {&colour_, &sky_}) *perRay = device.array<float>(size_t{3} * batch_.rays);
+  for (Array<float>* perRay : {&opacity_, &depth_}) *perRay = device.array<float>(batch_.rays);
+  weights_ = device.array<float>(batch_.samples);
 }
 
 std::vector<uint32_t> MeshPartRenderer::renderPiece(const ImageRays::Piece& piece) {
@@ -84,7 +83,7 @@ RenderedView MeshPartRenderer::render(const Camera& camera, const Pose& worldFro
                    opaqueDepth);
   RenderedView view = makeEmptyView(camera);
   skyColours_ = model_.part().isBackground() ? ImageF(camera.width, camera.height, 3) : ImageF();
-  imageRays_.renderInPieces(kSamples, [&](const ImageRays::Piece& piece, size_t first) {
+  imageRays_.renderInPieces(batch_.samples, [&](const ImageRays::Piece& piece, size_t first) {
     const std::vector<uint32_t> counters = renderPiece(piece);
     const uint32_t finished = counters[1];
     CHECK(finished >= 1u);  // one ray's hits always fit

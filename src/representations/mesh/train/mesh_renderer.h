@@ -25,6 +25,7 @@ class MeshPartRenderer final : public ViewRenderer {
 
   MeshModel& model_;
   uint32_t level_;
+  ImageBatch batch_;
   ImageRays imageRays_;
   MeshHits hits_;
   Array<uint32_t> counters_;
