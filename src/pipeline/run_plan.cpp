@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <thread>
 
 #include "base/error.h"
 #include "base/log.h"
@@ -157,6 +158,7 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
 
 TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs) {
   constexpr double kImportSeconds = 0.04e-6;  // for each pixel of a photo that is made smaller
+  constexpr double kImportBytes = 4;          // for each of its pixels
   constexpr double kStartAndEnd = 5;          // seconds, of a program
   constexpr double kBytesPerPixel = 3.3;      // of a photo in memory
   constexpr double kMaxPhotoShare = 0.4;      // of the memory: of more, training holds some at a time
@@ -167,8 +169,12 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
   const double shrunk =
       isReduced && size.sourcePixels > 0 ? std::min(1.0, 4 * pixels / static_cast<double>(size.sourcePixels)) : 1;
   TrainingNeeds needs;
+  // Each thread holds a photo as it was taken, and the smaller one.
+  const auto threads = static_cast<double>(std::max(1u, std::thread::hardware_concurrency()));
+  const double atOnce = isReduced ? std::min(photos, threads) * static_cast<double>(size.sourcePixels) : 0;
   needs.capture = {
-      isReduced ? photos * static_cast<double>(size.sourcePixels) * kImportSeconds * speed : photos * 0.005, 32 * kMiB,
+      isReduced ? photos * static_cast<double>(size.sourcePixels) * kImportSeconds * speed : photos * 0.005,
+      32 * kMiB + static_cast<int64_t>(kImportBytes * atOnce),
       static_cast<int64_t>(static_cast<double>(size.sourceBytes) * shrunk)};
   const double training = size.steps > 0 ? static_cast<double>(size.steps) * costs.secondsPerStep * speed
                                          : kSecondsPerMinute * size.minutes;

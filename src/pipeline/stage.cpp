@@ -210,12 +210,13 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
     write(begun, file);
     if (i > remaining.first && result.expected.seconds > kLongSeconds)
       inform("{} will take about {}", stage.name, describeDuration(result.expected.seconds));
+    const bool measuresPeak = restartPeakResidentBytes();
     const auto start = std::chrono::steady_clock::now();
     const StageOutcome outcome = stage.run(resumes);
     result.isFinished = true;
     result.summary = outcome.summary;
     result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    result.peakBytes = std::max(outcome.peakBytes, residentBytes());
+    result.peakBytes = std::max(outcome.peakBytes, measuresPeak ? peakResidentBytes() : residentBytes());
     RunPlan later;
     for (size_t k = i + 1; k < remaining.end; ++k) later.entries.push_back({stages[k].name, stages[k].needs(false)});
     const double left = later.total().seconds;
