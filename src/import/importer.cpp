@@ -220,6 +220,7 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
   std::mutex mutex;
   int64_t done = 0;
   pool.run(photos.size(), [&](size_t i, int) {
+    options.look();
     Photo& photo = photos[i];
     const Size size = reduced(facts[i], options.downscale);
     outcomes.photos[i] = importPhoto(photo.image, imageTargets[i], size.width, size.height);

@@ -16,6 +16,7 @@
 // transforms.json is written last, and sources.txt records which images can be reused (picture_origins.h).
 #pragma once
 
+#include <functional>
 #include <string>
 
 #include "base/file.h"
@@ -33,6 +34,8 @@ struct ImportOptions {
   int threads = 0;  // 0: all
   // MaskCommand: run for each photo as it is stored, one after another. Masks of the source apply, too. Empty: none.
   std::string maskCommand;
+  // Called before each photo, from several threads. What it throws ends the import, which resumes when run again.
+  std::function<void()> look = [] {};
 };
 
 // Throws Error if `source` cannot be imported; if it is a plain folder of photos, the error names the commands to run.

@@ -12,7 +12,6 @@
 #include "base/order_statistics.h"
 #include "base/progress.h"
 #include "import/georeference.h"
-#include "import/holdout.h"
 #include "import/importer.h"
 #include "photogrammetry/photo_list.h"
 #include "photogrammetry/photo_masks.h"
@@ -28,15 +27,10 @@
 #include "pipeline/posed_source.h"
 #include "pipeline/run_estimator.h"
 #include "pipeline/run_report.h"
+#include "pipeline/run_request.h"
 
 namespace tessera {
 namespace {
-
-bool liesIn(const fs::path& path, const fs::path& folder) {
-  const fs::path inside =
-      fs::weakly_canonical(fs::absolute(path)).lexically_relative(fs::weakly_canonical(fs::absolute(folder)));
-  return !inside.empty() && *inside.begin() != "..";
-}
 
 class PhotoRun {
  public:
@@ -339,9 +333,11 @@ class PhotoRun {
     SourceCapture source = posed_ ? posed_->take(out("poses")) : models_->read();
     std::set<std::string> dropped;
     for (const Photo& photo : source.capture.photos) dropped.insert(photo.name);
-    const Capture capture =
-        importSource(std::move(source), options_.photos.string(), out("capture"),
-                     {.downscale = downscale(), .holdout = options_.holdout, .threads = options_.threads});
+    const Capture capture = importSource(
+        std::move(source), options_.photos.string(), out("capture"),
+        {.downscale = downscale(), .holdout = options_.holdout, .threads = options_.threads, .look = [this] {
+           stopIfInterrupted();
+         }});
     for (const Photo& photo : capture.photos) dropped.erase(photo.name);
     addLeftOut(leftOutFile(), dropped, "damaged: it ends early, or cannot be decoded");
     const std::string size = downscale() > 1 ? fmt::format(", made smaller by {}", downscale()) : "";
@@ -354,7 +350,7 @@ class PhotoRun {
     std::error_code status;
     fs::create_directories(out("logs"), status);
     const fs::path log = options_.out / "logs" / (verb + ".log");
-    arguments.insert(arguments.begin(), {options_.program, verb});
+    arguments.insert(arguments.begin(), {options_.program, verb, "--device", options_.device});
     if (options_.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(options_.threads)});
     ChildProcess process;
     const std::string failure = process.start(arguments, {.log = log, .hasOwnGroup = true});
@@ -448,40 +444,10 @@ class PhotoRun {
   std::unique_ptr<RunEstimator> estimator_;
 };
 
-// The command with all that has been asked for.
-std::string describeRequest(const PhotoRunOptions& options) {
-  std::string text = fmt::format("run {} {} --method {} --holdout {}", options.photos.string(), options.out.string(),
-                                 options.method, options.holdout);
-  text += options.steps > 0 ? fmt::format(" --steps {}", options.steps) : fmt::format(" --minutes {}", options.minutes);
-  if (options.downscale > 0) text += fmt::format(" --downscale {}", options.downscale);
-  if (options.frames > 0) text += fmt::format(" --frames {}", options.frames);
-  if (options.threads > 0) text += fmt::format(" --threads {}", options.threads);
-  if (!options.masks.empty()) text += " --masks " + options.masks.string();
-  if (!options.range.from.empty()) text += " --from " + options.range.from;
-  if (!options.range.until.empty()) text += " --until " + options.range.until;
-  return text;
-}
-
 }  // namespace
 
 void runFromPhotos(const PhotoRunOptions& options) {
-  std::error_code status;
-  const bool isFile = fs::is_regular_file(options.photos, status);
-  if (!isFile && !fs::is_directory(options.photos, status))
-    throw Error(options.photos.string(), "", "is neither a folder nor a file", "name a folder of photos, or a video");
-  if (!isFile && options.frames > 0)
-    throw Error("--frames", "", "concerns videos, and this is a folder", "leave it out, or name a video");
-  if (liesIn(options.out, options.photos)) {
-    throw Error(options.out.string(), "", "is the folder of photos, or in it: its pictures would be taken for photos",
-                "name another folder to write to");
-  }
-  checkHoldOut(options.holdout);
-  for (const char* name : {"frames", "poses", "capture", "model", "scene", "probe", "logs", "report.html",
-                           "evaluation.html", "eval.json"}) {
-    if (!fs::exists(options.out / name, status) || fs::exists(options.out / "run.json", status)) continue;
-    throw Error((options.out / name).string(), "", "was not made by such a run, and would be replaced",
-                "name another folder to write to");
-  }
+  requireUsableRequest(options);
   const FolderLock lock(options.out);
   claimFolder(options.out);
   PhotoRun run(options);

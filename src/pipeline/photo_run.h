@@ -34,6 +34,7 @@ struct PhotoRunOptions {
   int64_t steps = 0;             // instead of minutes, if above 0
   int downscale = 0;             // 0: chooseDownscale
   std::string holdout = "auto";  // as for `import`; of photos without poses: every:8
+  std::string device = "cpu";    // of training, baking and evaluating: DeviceOptions::kind
   int threads = 0;               // 0: all
   std::string program;           // this program, which trains, bakes and evaluates
   TrainingCosts costs;           // of `method`

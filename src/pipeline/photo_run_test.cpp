@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cstdlib>
 
 #include "base/error.h"
@@ -113,6 +114,17 @@ TEST_F(PhotoRuns, OfPosedPhotosAreRepeatedIfTheirPlaceOnTheEarthChanges) {
   EXPECT_TRUE(contains(run(), "capture    finished before"));
   placed("9");
   EXPECT_FALSE(contains(run(), "capture    finished before"));
+}
+
+TEST_F(PhotoRuns, CanBeInterruptedWhilePhotosAreImported) {
+  writePosed(9);
+  std::atomic<int> asked = 0;
+  options_.interrupted = [&] { return ++asked > 4; };
+  EXPECT_THROW(runFromPhotos(options_), RunInterrupted);
+  EXPECT_FALSE(has("capture/transforms.json"));
+  EXPECT_GT(asked, 4);
+  options_.interrupted = [] { return false; };
+  EXPECT_TRUE(contains(run(), "9 photos, 2 held out"));
 }
 
 TEST_F(PhotoRuns, RefuseFoldersOfOtherPrograms) {
