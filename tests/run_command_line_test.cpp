@@ -30,6 +30,9 @@ TEST_F(RunCommandLine, RefusesFoldersWithoutEnoughPhotos) {
   EXPECT_EQ(said.exitCode, 1);
   EXPECT_TRUE(contains(said.err, "holds 1 photos that can be used")) << said.err;
   EXPECT_EQ(run({"--method", "field"}).exitCode, 2) << "it is not baked";
+  said = run({"--device", "abacus"});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "abacus")) << said.err;
   for (const char* out : {"", "/out"}) {
     said = Program(folder_.path(), {"run", photos_.string(), photos_.string() + out}).wait();
     EXPECT_EQ(said.exitCode, 1);
@@ -131,7 +134,8 @@ TEST_F(RunCommandLine, ServesTheSceneWhenItHasEnded) {
   EXPECT_TRUE(contains(said.out, "report.html")) << said.out;
   EXPECT_TRUE(fs::exists(folder_ / "out/scene/tileset.json"));
   EXPECT_EQ(run({"--serve", "0", "--until", "bake"}).exitCode, 2) << "the scene is served at the end only";
-  EXPECT_EQ(run({"--viewer", "."}).exitCode, 2) << "it is of no use without --serve";
+  for (const char* flag : {"--viewer", "--address"})
+    EXPECT_EQ(run({flag, "."}).exitCode, 2) << flag << " is of no use without --serve";
 }
 
 TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {
