@@ -252,11 +252,10 @@ TEST_F(CommandLine, SaysWhyAFolderCannotBeServedAndWhatToDo) {
   says(at("source"),
        "is a folder of photos that are not imported yet, not a scene; import, train and bake them first: tessera "
        "import " +
-           at("source") +
-           " CAPTURE, then tessera train CAPTURE MODEL --method volume, then tessera bake "
-           "MODEL SCENE");
-  says(city(), "is a capture, not a scene; train and bake it first: tessera train " + city() +
-                   " MODEL --method volume, then tessera bake MODEL SCENE");
+           at("source") + " CAPTURE, then tessera train CAPTURE MODEL --method " + kBakedMethods.front() +
+           ", then tessera bake MODEL SCENE");
+  says(city(), "is a capture, not a scene; train and bake it first: tessera train " + city() + " MODEL --method " +
+                   kBakedMethods.front() + ", then tessera bake MODEL SCENE");
   says(model(), "is a model of --method field, of which no scene can be baked; train one with --method " +
                     joinNames(kBakedMethods) + ", and bake that; tessera view shows this one");
   const std::string volume = at("volume.model");

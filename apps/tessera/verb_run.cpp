@@ -10,14 +10,10 @@
 namespace tessera {
 namespace {
 
-bool canBeBaked(const Method& method) {
-  return method.openBaker != nullptr;
-}
-
 std::vector<std::string> bakedMethods() {
   std::vector<std::string> names;
   for (const Method* method : methods())
-    if (canBeBaked(*method)) names.emplace_back(method->name);
+    if (isBaked(*method)) names.emplace_back(method->name);
   return names;
 }
 
@@ -38,7 +34,7 @@ TrainingCosts typicalCosts(const std::string& method, bool onGpu) {
 
 void addRunVerb(CLI::App& app) {
   auto options = std::make_shared<PhotoRunOptions>();
-  options->method = firstMethod(canBeBaked).name;
+  options->method = firstMethod(isBaked).name;
   CLI::App* verb =
       app.add_subcommand("run", "a folder of photos, or a video, to a scene: poses, training, baking, evaluation");
   verb->footer(

@@ -10,6 +10,8 @@ namespace tessera {
 namespace {
 
 constexpr double kOutliers = 0.002;     // fraction of points at either end
+constexpr size_t kConfirming = 3;       // photos of a point: what only two photos match may be a mistake
+constexpr double kConfirmed = 0.5;      // share of the points that are confirmed; if fewer are, all count
 constexpr double kWider = 0.1;          // margin at either end, relative to the range
 constexpr double kGap = 0.25;           // relative to the range: the range extends over points that follow within it
 constexpr size_t kTogether = 3;         // number of points that must follow within the gap
@@ -43,6 +45,27 @@ double findFlightHeight(std::vector<double> cameras) {
   return cameras.empty() ? 0 : percentile(cameras, 0.05);
 }
 
+// Returns the heights of the points in the region, sorted: of those that enough photos confirm, if they are the most.
+std::vector<double> findPointHeights(const Capture& capture, const Ground& ground, const Region& region,
+                                     double highestCamera) {
+  const double side = std::max(region.rectangle.width, region.rectangle.depth);
+  std::vector<size_t> photosOfPoint(capture.points.size());
+  for (const Observation& observation : capture.observations) ++photosOfPoint[observation.point];
+  std::vector<double> all, confirmed;
+  for (size_t i = 0; i < capture.points.size(); ++i) {
+    const Vec3d at = ground.inGround(capture.points[i].xInWorld);
+    if (region.looksAtGround && at.z() > highestCamera) continue;
+    if (!region.rectangle.holds(at.head<2>(), kAround * side)) continue;
+    all.push_back(at.z());
+    if (photosOfPoint[i] >= kConfirming) confirmed.push_back(at.z());
+  }
+  const bool suffice = static_cast<double>(confirmed.size()) >= kConfirmed * static_cast<double>(all.size()) &&
+                       confirmed.size() >= kEnoughGroundPoints;
+  std::vector<double>& heights = suffice ? confirmed : all;
+  std::sort(heights.begin(), heights.end());
+  return std::move(heights);
+}
+
 }  // namespace
 
 Heights findHeights(const Capture& capture, const Ground& ground, const Region& region) {
@@ -54,15 +77,9 @@ Heights findHeights(const Capture& capture, const Ground& ground, const Region& 
   }
   const double highest = *std::max_element(cameras.begin(), cameras.end());
 
-  std::vector<double> heights;
-  for (const SparsePoint& point : capture.points) {
-    const Vec3d at = ground.inGround(point.xInWorld);
-    if (region.looksAtGround && at.z() > highest) continue;
-    if (region.rectangle.holds(at.head<2>(), kAround * side)) heights.push_back(at.z());
-  }
+  const std::vector<double> heights = findPointHeights(capture, ground, region, highest);
   Heights extent;
   if (heights.size() >= kEnoughGroundPoints) {
-    std::sort(heights.begin(), heights.end());
     const auto rank = static_cast<size_t>(kOutliers * static_cast<double>(heights.size() - 1));
     const size_t first = rank;
     size_t last = heights.size() - 1 - rank;

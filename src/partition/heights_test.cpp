@@ -47,6 +47,30 @@ TEST(Heights, IgnoreAFewPointsInTheAirAndBelowTheGround) {
   EXPECT_NEAR(after.bottom, before.bottom, 0.1);
 }
 
+TEST(Heights, IgnorePointsThatOnlyTwoPhotosMatchIfMostAreConfirmed) {
+  Capture capture = flight(6, 6, 20, 60);
+  addPoints(capture, 20000, {0, 0, -1}, {100, 100, 9}, 1);
+  const Heights before = findCaptureHeights(capture);
+  const auto observe = [&](size_t first, size_t end, uint32_t photos) {
+    for (size_t point = first; point < end; ++point)
+      for (uint32_t photo = 0; photo < photos; ++photo)
+        capture.observations.push_back({photo, static_cast<uint32_t>(point)});
+  };
+  const size_t right = capture.points.size();
+  addPoints(capture, 400, {0, 0, -300}, {100, 100, -100}, 2);  // windows that were mistaken for others
+  const size_t all = capture.points.size();
+  EXPECT_LT(findCaptureHeights(capture).bottom, -100) << "how many photos show them is not known";
+  observe(0, right, 3);
+  observe(right, all, 2);
+  EXPECT_NEAR(findCaptureHeights(capture).bottom, before.bottom, 0.1);
+  EXPECT_NEAR(findCaptureHeights(capture).top, before.top, 0.1);
+
+  capture.observations.clear();
+  observe(0, right / 3, 3);
+  observe(right / 3, all, 2);
+  EXPECT_LT(findCaptureHeights(capture).bottom, -100) << "most points are seen by two photos";
+}
+
 TEST(Heights, EndBelowTheHighestCameraOfAFlight) {
   Capture capture = flight(6, 6, 20, 60);
   addPoints(capture, 1000, {0, 0, -1}, {100, 100, 9}, 1);
