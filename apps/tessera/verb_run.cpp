@@ -17,7 +17,8 @@ std::vector<std::string> bakedMethods() {
   return names;
 }
 
-// On a GPU, an H200 trains 28 (volume) to 40 (hash) times as fast as two cores; others are taken to reach a third.
+// An H200 trains 28 to 40 times the rays of MethodCosts::raysPerSecond in the same time, which depends on the method;
+// smaller GPUs are taken to train ten times as many.
 TrainingCosts typicalCosts(const std::string& method, bool onGpu) {
   const MethodCosts costs = findMethod(method)->costs;
   const double speed = onGpu ? 10 : 1;

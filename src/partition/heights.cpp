@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/order_statistics.h"
+#include "partition/cameras.h"
 
 namespace tessera {
 namespace {
@@ -45,7 +46,7 @@ double findFlightHeight(std::vector<double> cameras) {
   return cameras.empty() ? 0 : percentile(cameras, 0.05);
 }
 
-// Returns the heights of the points in the region, sorted: of those that enough photos confirm, if they are the most.
+// Returns the heights of the points in the region, sorted: if enough photos confirm most points, of those alone.
 std::vector<double> findPointHeights(const Capture& capture, const Ground& ground, const Region& region,
                                      double highestCamera) {
   const double side = std::max(region.rectangle.width, region.rectangle.depth);

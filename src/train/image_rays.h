@@ -27,6 +27,7 @@ struct ImageBatch {
   static constexpr uint32_t kLeastSamples = 1 << 16;
   uint32_t rays = 1 << 12, samples = kLeastSamples;
 
+  // Larger if the device is a GPU with memory of its own.
   static ImageBatch on(const Device& device);
 };
 
