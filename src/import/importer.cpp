@@ -265,6 +265,7 @@ void setExposures(Capture& capture, const std::vector<PhotoFacts>& facts) {
     if (stops[i]) capture.photos[i].exposure = *stops[i] - sum / count;
 }
 
+// Names the files of the source: those of the capture may have other names.
 void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
   std::vector<std::string> truncated, unreadable;
   std::vector<size_t> usable;
@@ -274,10 +275,10 @@ void dropFailed(SourceCapture& source, const Outcomes& outcomes) {
         usable.push_back(i);
         break;
       case FileOutcome::truncated:
-        truncated.push_back(source.capture.photos[i].name);
+        truncated.push_back(source.capture.photos[i].image.string());
         break;
       case FileOutcome::unreadable:
-        unreadable.push_back(source.capture.photos[i].name);
+        unreadable.push_back(source.capture.photos[i].image.string());
         break;
     }
   }

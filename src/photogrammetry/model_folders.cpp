@@ -46,4 +46,26 @@ uint64_t statedPhotos(const fs::path& folder) {
   return statedCount(folder / "points3D.bin") > 0 ? statedCount(folder / "images.bin") : 0;
 }
 
+void removeFolder(const fs::path& folder) {
+  std::error_code status;
+  fs::remove_all(folder, status);
+  if (status) throw Error(folder.string(), "", "cannot be removed: " + status.message(), "remove it");
+}
+
+void makeFolder(const fs::path& folder) {
+  std::error_code status;
+  fs::create_directories(folder, status);
+  if (status) throw Error(folder.string(), "", "cannot be written: " + status.message(), "check the disk");
+}
+
+void replaceFolder(const fs::path& newFolder, const fs::path& target) {
+  const fs::path before = fs::path(target) += ".before";
+  std::error_code status;
+  fs::remove_all(before, status);
+  if (fs::exists(target, status)) fs::rename(target, before, status);
+  fs::rename(newFolder, target, status);
+  if (status) throw Error(target.string(), "", "cannot be written: " + status.message(), "check the disk");
+  fs::remove_all(before, status);
+}
+
 }  // namespace tessera

@@ -27,4 +27,10 @@ uint64_t statedCount(const fs::path& path);
 // Returns the number of photos that a model states, without reading all of it; 0 if it was not written to its end.
 uint64_t statedPhotos(const fs::path& folder);
 
+// The following throw Error if they cannot do so.
+void removeFolder(const fs::path& folder);
+void makeFolder(const fs::path& folder);
+// Puts a folder in the place of another, which is there until then.
+void replaceFolder(const fs::path& newFolder, const fs::path& target);
+
 }  // namespace tessera

@@ -4,91 +4,19 @@
 
 #include <algorithm>
 #include <cstring>
-#include <fstream>
 #include <map>
-#include <optional>
-#include <set>
 
 #include "base/error.h"
 #include "base/log.h"
 #include "import/colmap_model.h"
 #include "import/georeference.h"
-#include "photogrammetry/colmap_database.h"
-#include "photogrammetry/model_folders.h"
 
 namespace tessera {
 namespace {
 
-constexpr int kPhotosPerSnapshot = 25;
-constexpr size_t kKeptSnapshots = 2;        // the largest may be incomplete on the disk
-constexpr size_t kLeastShared = 3;          // photos that model_merger needs
 constexpr size_t kPhotosForFullLens = 40;   // of a camera, from which on its principal point is adjusted
 constexpr double kFarthestCentre = 0.05;    // of the size of the picture, of a principal point from the middle
 constexpr const char* kAdjustments = "12";  // iterations: eight brought the change of the cost below one in a million
-
-constexpr const char* kNoModel = "failed to create sparse model";  // what the mapper says then
-
-// Returns the end of a log.
-std::string readEnd(const fs::path& log) {
-  constexpr std::streamoff kTail = 1 << 14;
-  std::ifstream file(log, std::ios::binary | std::ios::ate);
-  if (!file) return {};
-  const std::streamoff size = file.tellg();
-  std::string text(static_cast<size_t>(std::min(size, kTail)), '\0');
-  file.seekg(size - static_cast<std::streamoff>(text.size()));
-  file.read(text.data(), static_cast<std::streamsize>(text.size()));
-  return text;
-}
-
-// Returns the number of photos that the mapper has registered last, from "Registering image #7 (3)" in its log.
-int64_t lastRegistered(const fs::path& log) {
-  const std::string text = readEnd(log);
-  const size_t at = text.rfind("Registering image #");
-  if (at == text.npos) return 0;
-  const size_t open = text.find('(', at);
-  return open == text.npos ? 0 : std::atoll(text.c_str() + open + 1);
-}
-
-// Whether the photos of a model see enough points to say how they stand. Those of a camera that only turns see none.
-bool isSupported(const Piece& piece) {
-  constexpr uint64_t kLeastPerPhoto = 10;
-  return statedCount(piece.folder / "points3D.bin") >= kLeastPerPhoto * piece.photos.size();
-}
-
-// Removes all but the snapshots with the most photos: together, they would grow with the square of the number of
-// photos. Their names are times that overflow, and say nothing.
-void thinSnapshots(const fs::path& folder) {
-  std::vector<std::pair<uint64_t, fs::path>> complete;
-  std::error_code status;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
-    if (const uint64_t photos = statedPhotos(entry.path()); photos > 0) complete.emplace_back(photos, entry.path());
-  }
-  std::sort(complete.begin(), complete.end(), std::greater<>());
-  for (size_t i = kKeptSnapshots; i < complete.size(); ++i) fs::remove_all(complete[i].second, status);
-}
-
-void removeFolder(const fs::path& folder) {
-  std::error_code status;
-  fs::remove_all(folder, status);
-  if (status) throw Error(folder.string(), "", "cannot be removed: " + status.message(), "remove it");
-}
-
-void makeFolder(const fs::path& folder) {
-  std::error_code status;
-  fs::create_directories(folder, status);
-  if (status) throw Error(folder.string(), "", "cannot be written: " + status.message(), "check the disk");
-}
-
-// Puts a folder in the place of another, which is there until then.
-void replaceFolder(const fs::path& newFolder, const fs::path& target) {
-  const fs::path before = fs::path(target) += ".before";
-  std::error_code status;
-  fs::remove_all(before, status);
-  if (fs::exists(target, status)) fs::rename(target, before, status);
-  fs::rename(newFolder, target, status);
-  if (status) throw Error(target.string(), "", "cannot be written: " + status.message(), "check the disk");
-  fs::remove_all(before, status);
-}
 
 // Returns cameras.bin with these cameras.
 Bytes encodeCameras(const std::map<uint32_t, Camera>& cameras) {
@@ -142,125 +70,6 @@ void PhotoModels::runColmap(const char* step, std::vector<std::string> arguments
   ColmapProgram colmap(folder_ / fmt::format("{}.log", step), settings_.program);
   colmap.run(std::move(arguments), look);
   peakBytes_ = std::max(peakBytes_, colmap.peakBytes());
-}
-
-void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch) {
-  const fs::path log = folder_ / "mapping.log", snapshots = folder_ / "snapshots", begun = folder_ / "snapshot.begun";
-  std::error_code status;
-  if (!resumes) fs::remove_all(begun, status);
-  // The snapshot that an interrupted call went on from is kept until there is another one.
-  if (const auto pieces = resumes ? piecesIn(snapshots) : std::vector<Piece>(); !pieces.empty()) {
-    fs::remove_all(begun, status);
-    fs::rename(pieces[0].folder, begun, status);
-  }
-  fs::remove_all(snapshots, status);
-  fs::remove_all(output, status);
-  fs::remove(log, status);
-  makeFolder(output);
-  makeFolder(snapshots);
-  std::vector<std::string> arguments{"mapper",
-                                     "--database_path",
-                                     (folder_ / "database.db").string(),
-                                     "--image_path",
-                                     (folder_ / "images").string(),
-                                     "--output_path",
-                                     output.string(),
-                                     "--Mapper.num_threads",
-                                     settings_.threadsText(),
-                                     "--Mapper.min_model_size",
-                                     "3",
-                                     "--Mapper.init_min_tri_angle",
-                                     "8",
-                                     "--Mapper.ba_global_function_tolerance",
-                                     "1e-6",
-                                     "--Mapper.ba_global_images_ratio",
-                                     "1.2",
-                                     "--Mapper.ba_global_points_ratio",
-                                     "1.2",
-                                     "--Mapper.ba_global_max_refinements",
-                                     "2",
-                                     "--Mapper.snapshot_path",
-                                     snapshots.string(),
-                                     "--Mapper.snapshot_images_freq",
-                                     std::to_string(kPhotosPerSnapshot)};
-  const fs::path from = photosIn(begun).empty() ? input : begun;
-  if (!from.empty()) arguments.insert(arguments.end(), {"--input_path", from.string()});
-  runColmap("mapping", std::move(arguments), [&] {
-    thinSnapshots(snapshots);
-    watch(lastRegistered(log));
-  });
-}
-
-void PhotoModels::map(bool resumes, const Watch& watch) {
-  const fs::path partial = folder_ / "sparse.partial";
-  try {
-    runMapper({}, partial, resumes, watch);
-  } catch (const Error&) {
-    // Without any model, the mapper reports failure, too.
-    if (readEnd(folder_ / "mapping.log").find(kNoModel) == std::string::npos) throw;
-  }
-  // Going on from a snapshot, it writes one model, into the folder itself.
-  const bool wentOn = !photosIn(partial).empty();
-  if (wentOn) {
-    makeFolder(partial / "0");
-    for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"})
-      fs::rename(partial / name, partial / "0" / name);
-  }
-  mapRest(partial, wentOn, watch);
-  for (const Piece& piece : piecesIn(partial))
-    if (!isSupported(piece)) removeFolder(piece.folder);
-  if (piecesIn(partial).empty()) {
-    throw Error(
-        folder_.string(), "", "no two photos could be placed relative to each other",
-        "check that neighbouring photos overlap by more than half, are sharp, and were taken from different places");
-  }
-  replaceFolder(partial, folder_ / "sparse");
-  // What came of the models before.
-  discardAdjusted();
-  discardJoined();
-}
-
-void PhotoModels::mapRest(const fs::path& models, bool withNeighbours, const Watch& watch) {
-  const fs::path list = folder_ / "rest.txt", rest = folder_ / "rest.partial";
-  std::set<int> placed;
-  for (const Piece& piece : piecesIn(models)) placed.insert(piece.photos.begin(), piece.photos.end());
-  std::set<int> mapped;
-  for (int i = 0; i < static_cast<int>(list_.photos.size()); ++i)
-    if (!placed.contains(i)) mapped.insert(i);
-  if (placed.empty() || mapped.size() < 3) return;
-  if (withNeighbours) {
-    const std::set<int> missing = mapped;
-    for (const auto& [pair, inliers] : ColmapDatabase(folder_ / "database.db").inliers()) {
-      if (inliers == 0 || missing.contains(pair.first) == missing.contains(pair.second)) continue;
-      mapped.insert({pair.first, pair.second});
-    }
-  }
-  std::string names;
-  for (const int i : mapped) names += list_.photos[static_cast<size_t>(i)].safeName + "\n";
-  writeFileAtomically(list, names);
-  removeFolder(rest);
-  makeFolder(rest);
-  const fs::path log = folder_ / "mapping.log";
-  std::error_code status;
-  fs::remove(log, status);
-  try {
-    runColmap("mapping",
-              {"mapper", "--database_path", (folder_ / "database.db").string(), "--image_path",
-               (folder_ / "images").string(), "--output_path", rest.string(), "--image_list_path", list.string(),
-               "--Mapper.num_threads", settings_.threadsText(), "--Mapper.min_model_size", "3",
-               "--Mapper.init_min_tri_angle", "4", "--Mapper.init_min_num_inliers", "50"},
-              [&] { watch(static_cast<int64_t>(placed.size()) + lastRegistered(log)); });
-  } catch (const ColmapKilled&) {
-    throw;
-  } catch (const Error& error) {
-    if (readEnd(log).find(kNoModel) == std::string::npos) warn("no further models: {}", error.what());
-  }
-  for (const Piece& piece : piecesIn(rest)) {
-    fs::path place;
-    for (int i = 0; place.empty() || fs::exists(place, status); ++i) place = models / std::to_string(i);
-    fs::rename(piece.folder, place);
-  }
-  fs::remove_all(rest, status);
 }
 
 void PhotoModels::discardMapped() const {

@@ -8,12 +8,16 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
+#include <set>
 #include <utility>
 #include <vector>
 
 #include "import/source.h"
 #include "photogrammetry/colmap_program.h"
+#include "photogrammetry/model_folders.h"
 #include "photogrammetry/photo_list.h"
+#include "photogrammetry/photo_pairs.h"
 
 namespace tessera {
 
@@ -58,11 +62,28 @@ class PhotoModels {
   int64_t takePeakBytes() { return std::exchange(peakBytes_, 0); }  // of the programs run since the last call
 
  private:
+  static constexpr size_t kLeastShared = 3;  // photos of models that model_merger joins
+
   fs::path last(bool adjusted) const;
+  // What the mapper begins with: a model that it goes on from, or a pair of photos.
+  struct Beginning {
+    fs::path model;
+    std::optional<PhotoPair> pair;
+  };
   // Adds models of the photos that are in none: once there is a model, the mapper begins no other unless a pair is very
-  // well connected. With neighbours: also of the placed photos that are matched with them, so that the models can be
-  // joined.
+  // well connected. Where matches link such a model with placed photos, it is continued with these, so that the models
+  // can be joined. `withNeighbours`: all photos without a model are mapped with the placed ones that are linked with
+  // them.
   void mapRest(const fs::path& models, bool withNeighbours, const Watch& watch);
+  // If many photos have no model though matches link each with several that have one, the mapper began badly: adds
+  // models of them all that begin with other pairs.
+  void mapLinked(const fs::path& models, const Watch& watch);
+  // Adds models of these photos alone, with limits that are less strict than those of `map`, and returns them.
+  std::vector<Piece> mapOnly(const fs::path& models, const std::set<int>& photos, const Beginning& beginning,
+                             const Watch& watch);
+  std::set<int> notIn(const std::vector<Piece>& pieces) const;
+  // Returns these photos, and those that are well matched with one of them.
+  std::set<int> withMatched(std::set<int> photos) const;
   void runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch);
   void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
   bool agreesWithGps(const fs::path& joined, const fs::path& before) const;

@@ -21,6 +21,10 @@ std::vector<int> numbers(int begin, int end) {
 // The models of one list of photos, made by a script in place of colmap.
 class PhotoModelsTest : public testing::Test {
  protected:
+  PhotoModelsTest() {
+    fs::create_directories(folder_ / "poses");
+    makeDatabase(database_);
+  }
   PhotoModels models(const std::string& script, bool mapsRest = false) {
     return PhotoModels(folder_ / "poses", list_, {.program = writeColmap(folder_, script, mapsRest).string()});
   }
@@ -31,6 +35,7 @@ class PhotoModelsTest : public testing::Test {
   Camera adjustedCamera() { return readColmapModel(folder_ / "poses/adjusted").cameras.at(1); }
 
   TemporaryFolder folder_;
+  const fs::path database_ = folder_ / "poses/database.db";
   PhotoList list_ = numberedPhotos(50);
 };
 
@@ -70,12 +75,43 @@ TEST_F(PhotoModelsTest, IncludeThoseOfPhotosThatTheFirstLacks) {
   EXPECT_EQ(estimated.placedApart(), numbers(0, 20));
 }
 
+// Photos 20 to 49 are mapped apart from the first ones, of which 16 to 19 are matched with them.
+TEST_F(PhotoModelsTest, AreContinuedWithThePhotosThatMatchesLinkWithThem) {
+  for (int i = 16; i < 20; ++i) addInliers(database_, i, 20, 60);
+  addInliers(database_, 2, 30, 37);  // as of photos that do not overlap
+  const std::string lists = (folder_ / "lists").string();
+  PhotoModels estimated =
+      models("if [ -z \"$image_list_path\" ]; then cp -r " + prepared("a", numbers(0, 20)) +
+                 " $output_path/0; exit; fi; echo $(head -1 $image_list_path) ${input_path##*/} >> " + lists +
+                 "; if [ -n \"$input_path\" ]; then cp " + prepared("c", numbers(16, 50)) +
+                 "/* $output_path; else cp -r " + prepared("b", numbers(20, 50)) + " $output_path/0; fi",
+             true);
+  estimated.map(false, ignore);
+  EXPECT_EQ(readTextFile(folder_ / "lists"), "p20.jpg\np16.jpg 1\n");
+  EXPECT_EQ(estimated.countMapped().models, 2u);
+  EXPECT_EQ(estimated.unplaced(), numbers(0, 16)) << "until they are joined";
+}
+
+// A first model without photos that are well matched with it has begun badly.
+TEST_F(PhotoModelsTest, AreMappedAgainFromOtherPairsIfManyLinkedPhotosAreMissing) {
+  list_ = numberedPhotos(12);
+  for (int i = 0; i < 10; ++i)
+    for (const int missing : {10, 11}) addInliers(database_, i, missing, 100 + 10 * i + missing);
+  const std::string pairs = (folder_ / "pairs").string();
+  PhotoModels estimated =
+      models("if [ -z \"$image_list_path\" ]; then cp -r " + prepared("a", numbers(0, 10)) +
+                 " $output_path/0; exit; fi; echo $Mapper_init_image_id1 $Mapper_init_image_id2 >> " + pairs +
+                 "; [ $Mapper_init_image_id2 = 11 ] && cp -r " + prepared("b", numbers(0, 12)) + " $output_path/0",
+             true);
+  estimated.map(false, ignore);
+  EXPECT_EQ(readTextFile(folder_ / "pairs"), "10 12\n10 11\n") << "those with the most inliers";
+  EXPECT_EQ(estimated.unplaced(), std::vector<int>());
+}
+
 TEST_F(PhotoModelsTest, GoOnFromTheLastSnapshotThatIsWhole) {
   const std::string model = prepared("whole", numbers(0, 18)), fewer = prepared("fewer", numbers(0, 9));
-  fs::create_directories(folder_ / "poses");
-  makeDatabase(folder_ / "poses/database.db");
   // Photos 17 and 18 are matched: the former is mapped again with those that the model lacks, to be joined with it.
-  addInliers(folder_ / "poses/database.db", 17, 18, 60);
+  addInliers(database_, 17, 18, 60);
   // The first run writes snapshots and fails; with a model to go on from, it returns that model.
   const std::string listed = (folder_ / "listed").string();
   PhotoModels estimated =

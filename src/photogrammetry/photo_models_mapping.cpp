@@ -1,0 +1,252 @@
+// The steps of PhotoModels that run COLMAP's mapper.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "photogrammetry/colmap_database.h"
+#include "photogrammetry/photo_models.h"
+
+namespace tessera {
+namespace {
+
+constexpr int kPhotosPerSnapshot = 25;
+constexpr size_t kKeptSnapshots = 2;  // the largest may be incomplete on the disk
+constexpr int kLinkingInliers = 40;   // of a pair; photos that do not overlap were seen to have up to 37
+
+constexpr const char* kNoModel = "failed to create sparse model";  // what the mapper says then
+
+// Returns the end of a log.
+std::string readEnd(const fs::path& log) {
+  constexpr std::streamoff kTail = 1 << 14;
+  std::ifstream file(log, std::ios::binary | std::ios::ate);
+  if (!file) return {};
+  const std::streamoff size = file.tellg();
+  std::string text(static_cast<size_t>(std::min(size, kTail)), '\0');
+  file.seekg(size - static_cast<std::streamoff>(text.size()));
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  return text;
+}
+
+// Returns the number of photos that the mapper has registered last, from "Registering image #7 (3)" in its log.
+int64_t lastRegistered(const fs::path& log) {
+  const std::string text = readEnd(log);
+  const size_t at = text.rfind("Registering image #");
+  if (at == text.npos) return 0;
+  const size_t open = text.find('(', at);
+  return open == text.npos ? 0 : std::atoll(text.c_str() + open + 1);
+}
+
+// Whether the photos of a model see enough points to say how they stand. Those of a camera that only turns see none.
+bool isSupported(const Piece& piece) {
+  constexpr uint64_t kLeastPerPhoto = 10;
+  return statedCount(piece.folder / "points3D.bin") >= kLeastPerPhoto * piece.photos.size();
+}
+
+// Removes all but the snapshots with the most photos: together, they would grow with the square of the number of
+// photos. Their names are times that overflow, and say nothing.
+void thinSnapshots(const fs::path& folder) {
+  std::vector<std::pair<uint64_t, fs::path>> complete;
+  std::error_code status;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) {
+    if (const uint64_t photos = statedPhotos(entry.path()); photos > 0) complete.emplace_back(photos, entry.path());
+  }
+  std::sort(complete.begin(), complete.end(), std::greater<>());
+  for (size_t i = kKeptSnapshots; i < complete.size(); ++i) fs::remove_all(complete[i].second, status);
+}
+
+// Going on from a model, the mapper writes one model into the folder itself, not into 0. Moves it there; returns
+// whether there is one.
+bool moveIntoSubfolder(const fs::path& folder) {
+  if (photosIn(folder).empty()) return false;
+  makeFolder(folder / "0");
+  for (const char* name : {"cameras.bin", "images.bin", "points3D.bin"}) fs::rename(folder / name, folder / "0" / name);
+  return true;
+}
+
+}  // namespace
+
+void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch) {
+  const fs::path log = folder_ / "mapping.log", snapshots = folder_ / "snapshots", begun = folder_ / "snapshot.begun";
+  std::error_code status;
+  if (!resumes) fs::remove_all(begun, status);
+  // The snapshot that an interrupted call went on from is kept until there is another one.
+  if (const auto pieces = resumes ? piecesIn(snapshots) : std::vector<Piece>(); !pieces.empty()) {
+    fs::remove_all(begun, status);
+    fs::rename(pieces[0].folder, begun, status);
+  }
+  fs::remove_all(snapshots, status);
+  fs::remove_all(output, status);
+  fs::remove(log, status);
+  makeFolder(output);
+  makeFolder(snapshots);
+  std::vector<std::string> arguments{"mapper",
+                                     "--database_path",
+                                     (folder_ / "database.db").string(),
+                                     "--image_path",
+                                     (folder_ / "images").string(),
+                                     "--output_path",
+                                     output.string(),
+                                     "--Mapper.num_threads",
+                                     settings_.threadsText(),
+                                     "--Mapper.min_model_size",
+                                     "3",
+                                     "--Mapper.init_min_tri_angle",
+                                     "8",
+                                     "--Mapper.ba_global_function_tolerance",
+                                     "1e-6",
+                                     "--Mapper.ba_global_images_ratio",
+                                     "1.2",
+                                     "--Mapper.ba_global_points_ratio",
+                                     "1.2",
+                                     "--Mapper.ba_global_max_refinements",
+                                     "2",
+                                     "--Mapper.snapshot_path",
+                                     snapshots.string(),
+                                     "--Mapper.snapshot_images_freq",
+                                     std::to_string(kPhotosPerSnapshot)};
+  const fs::path from = photosIn(begun).empty() ? input : begun;
+  if (!from.empty()) arguments.insert(arguments.end(), {"--input_path", from.string()});
+  runColmap("mapping", std::move(arguments), [&] {
+    thinSnapshots(snapshots);
+    watch(lastRegistered(log));
+  });
+}
+
+void PhotoModels::map(bool resumes, const Watch& watch) {
+  const fs::path partial = folder_ / "sparse.partial";
+  try {
+    runMapper({}, partial, resumes, watch);
+  } catch (const Error&) {
+    // Without any model, the mapper reports failure, too.
+    if (readEnd(folder_ / "mapping.log").find(kNoModel) == std::string::npos) throw;
+  }
+  const bool wentOn = moveIntoSubfolder(partial);
+  mapRest(partial, wentOn, watch);
+  for (const Piece& piece : piecesIn(partial))
+    if (!isSupported(piece)) removeFolder(piece.folder);
+  if (piecesIn(partial).empty()) {
+    throw Error(
+        folder_.string(), "", "no two photos could be placed relative to each other",
+        "check that neighbouring photos overlap by more than half, are sharp, and were taken from different places");
+  }
+  replaceFolder(partial, folder_ / "sparse");
+  // What came of the models before.
+  discardAdjusted();
+  discardJoined();
+}
+
+std::set<int> PhotoModels::withMatched(std::set<int> photos) const {
+  const std::set<int> given = photos;
+  for (const auto& [pair, inliers] : ColmapDatabase(folder_ / "database.db").inliers()) {
+    if (inliers < kLinkingInliers || given.contains(pair.first) == given.contains(pair.second)) continue;
+    photos.insert({pair.first, pair.second});
+  }
+  return photos;
+}
+
+std::set<int> PhotoModels::notIn(const std::vector<Piece>& pieces) const {
+  std::set<int> photos;
+  for (int i = 0; i < static_cast<int>(list_.photos.size()); ++i) photos.insert(i);
+  for (const Piece& piece : pieces)
+    for (const int photo : piece.photos) photos.erase(photo);
+  return photos;
+}
+
+void PhotoModels::mapRest(const fs::path& models, bool withNeighbours, const Watch& watch) {
+  const std::set<int> missing = notIn(piecesIn(models));
+  const size_t placed = list_.photos.size() - missing.size();
+  if (placed == 0 || missing.empty()) return;
+  const Watch watchMore = [&](int64_t photos) { watch(static_cast<int64_t>(placed) + photos); };
+  if (missing.size() >= kLeastShared) {
+    const auto separate = mapOnly(models, withNeighbours ? withMatched(missing) : missing, {}, watchMore);
+    for (const Piece& piece : separate) {
+      if (withNeighbours || !isSupported(piece)) continue;
+      const std::set<int> linked = withMatched(piece.photos);
+      if (linked.size() < piece.photos.size() + kLeastShared) continue;
+      for (const Piece& larger : mapOnly(models, linked, {.model = piece.folder}, watchMore))
+        if (larger.photos.size() >= piece.photos.size()) removeFolder(piece.folder);
+    }
+  }
+  mapLinked(models, watchMore);
+}
+
+void PhotoModels::mapLinked(const fs::path& models, const Watch& watch) {
+  constexpr size_t kLinks = 3, kShareOfMany = 10, kAttempts = 4;
+  const std::vector<Piece> pieces = piecesIn(models);
+  const std::set<int> missing = notIn(pieces);
+  std::map<int, size_t> links;
+  std::vector<std::pair<int, PhotoPair>> beginnings;
+  for (const auto& [pair, inliers] : ColmapDatabase(folder_ / "database.db").inliers()) {
+    const bool isFirst = missing.contains(pair.first), isSecond = missing.contains(pair.second);
+    if (inliers < kLinkingInliers || (!isFirst && !isSecond)) continue;
+    beginnings.emplace_back(inliers, pair);
+    if (isFirst != isSecond) ++links[isFirst ? pair.first : pair.second];
+  }
+  std::set<int> linked;
+  for (const auto& [photo, count] : links)
+    if (count >= kLinks) linked.insert(photo);
+  if (linked.empty() || linked.size() * kShareOfMany < list_.photos.size()) return;
+  std::sort(beginnings.begin(), beginnings.end(), std::greater<>());
+  const std::set<int> photos = withMatched(linked);
+  for (size_t i = 0; i < std::min(kAttempts, beginnings.size()); ++i)
+    for (const Piece& piece : mapOnly(models, photos, {.pair = beginnings[i].second}, watch))
+      if (piece.photos.size() > pieces[0].photos.size() && isSupported(piece)) return;
+}
+
+std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<int>& photos, const Beginning& beginning,
+                                        const Watch& watch) {
+  const fs::path list = folder_ / "rest.txt", rest = folder_ / "rest.partial";
+  std::string names;
+  for (const int i : photos) names += list_.photos[static_cast<size_t>(i)].safeName + "\n";
+  writeFileAtomically(list, names);
+  removeFolder(rest);
+  makeFolder(rest);
+  const fs::path log = folder_ / "mapping.log";
+  std::error_code status;
+  fs::remove(log, status);
+  std::vector<std::string> arguments{"mapper",
+                                     "--database_path",
+                                     (folder_ / "database.db").string(),
+                                     "--image_path",
+                                     (folder_ / "images").string(),
+                                     "--output_path",
+                                     rest.string(),
+                                     "--image_list_path",
+                                     list.string(),
+                                     "--Mapper.num_threads",
+                                     settings_.threadsText(),
+                                     "--Mapper.min_model_size",
+                                     "3",
+                                     "--Mapper.init_min_tri_angle",
+                                     "4",
+                                     "--Mapper.init_min_num_inliers",
+                                     "50"};
+  if (!beginning.model.empty()) arguments.insert(arguments.end(), {"--input_path", beginning.model.string()});
+  if (const auto& pair = beginning.pair) {
+    arguments.insert(arguments.end(), {"--Mapper.init_image_id1", std::to_string(pair->first + 1),
+                                       "--Mapper.init_image_id2", std::to_string(pair->second + 1)});
+  }
+  try {
+    runColmap("mapping", std::move(arguments), [&] { watch(lastRegistered(log)); });
+  } catch (const ColmapKilled&) {
+    throw;
+  } catch (const Error& error) {
+    if (readEnd(log).find(kNoModel) == std::string::npos) warn("no further models: {}", error.what());
+  }
+  moveIntoSubfolder(rest);
+  std::vector<Piece> added = piecesIn(rest);
+  for (Piece& piece : added) {
+    fs::path place;
+    for (int i = 0; place.empty() || fs::exists(place, status); ++i) place = models / std::to_string(i);
+    fs::rename(piece.folder, place);
+    piece.folder = place;
+  }
+  fs::remove_all(rest, status);
+  return added;
+}
+
+}  // namespace tessera
