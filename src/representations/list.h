@@ -5,8 +5,9 @@
 // TESSERA_REPRESENTATIONS(TRAINED, SCENE) expands to one row per representation: TRAINED(name, Name) for one that is
 // trained and rendered as a model only, and SCENE(name, Name) for one whose models can also be baked to scenes. `name`
 // is the representation's name in --method, manifest.json and tileset.json, the name of its folder and the prefix of
-// its functions; `Name` is the prefix of its types. The first row is the default method of `tessera train`. A table of
-// methods uses all rows:
+// its functions; `Name` is the prefix of its types. The first row is the default method of `tessera train`, the first
+// SCENE row that of `tessera run`: the best after ten minutes on two cores (docs/benchmarks.md). A table of methods uses
+// all rows:
 //
 //     #define METHOD(name, Name) &name##Method(),
 //     const Method* const kMethods[] = {TESSERA_REPRESENTATIONS(METHOD, METHOD)};
@@ -21,7 +22,7 @@
 // clang-format off
 #define TESSERA_REPRESENTATIONS(TRAINED, SCENE) \
   TRAINED(field, Field)                         \
-  SCENE(volume, Volume)                         \
   SCENE(hash, Hash)                             \
+  SCENE(volume, Volume)                         \
   SCENE(mesh, Mesh)
 // clang-format on
