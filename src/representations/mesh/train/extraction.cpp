@@ -10,7 +10,7 @@
 namespace tessera {
 namespace {
 
-constexpr uint32_t kExtractionSamples = 1 << 17;
+constexpr uint32_t kMiddlesAtOnce = 1 << 17;
 // The directions of parallel rays count only for faces that no photo shows.
 constexpr float kParallelWeight = 1e-4f;
 constexpr uint32_t kAzimuths = 8;
@@ -20,7 +20,7 @@ constexpr double kElevations[] = {60, 45, 30};  // degrees above the horizon fro
 class PhotoFaces final : public PixelVisitor {
  public:
   PhotoFaces(MeshModel& model, RayFollower& follower)
-      : model_(model), follower_(follower), imageRays_(model.device(), RayFollower::kMaxRays) {}
+      : model_(model), follower_(follower), imageRays_(model.device(), follower.maxRays()) {}
 
   void begin(const Photo& photo, const Camera& camera) override {
     imageRays_.begin(makeRayCamera(camera, photo.worldFromCamera, model_.frame()), model_.frame(), {});
@@ -63,7 +63,7 @@ void markParallel(Device& device, RayFollower& follower, const Vec3d& direction,
         origins.push_back(static_cast<float>(origin[axis]));
         directions.push_back(static_cast<float>(direction[axis]));
       }
-      if (origins.size() == size_t{3} * RayFollower::kMaxRays) follow();
+      if (origins.size() == size_t{3} * follower.maxRays()) follow();
     }
   }
   follow();
@@ -73,17 +73,17 @@ void markParallel(Device& device, RayFollower& follower, const Vec3d& direction,
 class HoleCounter final : public RayFollower {
  public:
   explicit HoleCounter(MeshModel& model)
-      : model_(model),
-        hits_(model.device(), kMaxRays, kExtractionSamples),
+      : RayFollower(model.device()),
+        model_(model),
+        hits_(model.device(), maxRays(), maxSamples()),
         counters_(model.device().array<uint32_t>(MeshHits::kCounters)),
-        logits_(model.device().array<float>(kExtractionSamples)) {
+        logits_(model.device().array<float>(maxSamples())) {
     hits_.counters = counters_;
     coverage_.part = model.part().name;
-    model.field().reserve(kExtractionSamples);
+    model.field().reserve(maxSamples());
   }
 
   uint32_t follow(const MeshRays& rays, float) override {
-    constexpr uint32_t kMaxHits = 1024;  // of a ray
     Device& device = model_.device();
     model_.level(0).trace(rays, kMaxHits, false, hits_);
     model_.field().encode(hits_.samples(), hits_.positions, Matrix<float>(logits_, 1));
@@ -123,13 +123,12 @@ void addNeighbours(MeshModel& model, uint32_t level, float minOpacity, FaceSet& 
     const FaceSet quads = FaceSet::quads(domain.grids);
     std::erase_if(neighbours, [&](uint32_t face) { return !quads.contains(face); });
   }
-  Array<float> positions = device.array<float>(size_t{3} * kExtractionSamples),
-               logits = device.array<float>(kExtractionSamples);
-  model.field().reserve(kExtractionSamples);
-  for (size_t begin = 0; begin < neighbours.size(); begin += kExtractionSamples) {
-    const auto some =
-        std::span(neighbours).subspan(begin, std::min<size_t>(kExtractionSamples, neighbours.size() - begin));
-    std::vector<float> middles(size_t{3} * kExtractionSamples);
+  Array<float> positions = device.array<float>(size_t{3} * kMiddlesAtOnce),
+               logits = device.array<float>(kMiddlesAtOnce);
+  model.field().reserve(kMiddlesAtOnce);
+  for (size_t begin = 0; begin < neighbours.size(); begin += kMiddlesAtOnce) {
+    const auto some = std::span(neighbours).subspan(begin, std::min<size_t>(kMiddlesAtOnce, neighbours.size() - begin));
+    std::vector<float> middles(size_t{3} * kMiddlesAtOnce);
     for (size_t i = 0; i < some.size(); ++i) {
       const OctahedraGrid& grid = domain.grids[some[i] / kFacesPerCell / cells];
       for (const auto& corner : octahedronFace(some[i] % kFacesPerCell)) {
@@ -154,19 +153,19 @@ void addNeighbours(MeshModel& model, uint32_t level, float minOpacity, FaceSet& 
 }  // namespace
 
 FaceMarker::FaceMarker(MeshModel& model, uint32_t level, const ExtractionSettings& settings)
-    : model_(model),
+    : RayFollower(model.device()),
+      model_(model),
       level_(level),
       settings_(settings),
       faces_(model.level(level).domain().grids),
-      hits_(model.device(), kMaxRays, kExtractionSamples),
+      hits_(model.device(), maxRays(), maxSamples()),
       counters_(model.device().array<uint32_t>(MeshHits::kCounters)),
-      logits_(model.device().array<float>(kExtractionSamples)) {
+      logits_(model.device().array<float>(maxSamples())) {
   hits_.counters = counters_;
-  model.field().reserve(kExtractionSamples);
+  model.field().reserve(maxSamples());
 }
 
 uint32_t FaceMarker::follow(const MeshRays& rays, float weight) {
-  constexpr uint32_t kMaxHits = 1024;  // of a ray
   Device& device = model_.device();
   model_.level(level_).trace(rays, kMaxHits, false, hits_);
   model_.field().encode(hits_.samples(), hits_.positions, Matrix<float>(logits_, 1));
@@ -194,7 +193,7 @@ void followRays(MeshModel& model, uint32_t level, const Capture& capture, const 
                 const ExtractionSettings& settings, RayFollower& follower,
                 const std::function<void(int64_t, int64_t)>& onPhoto) {
   PhotoFaces faces(model, follower);
-  PhotoVisitor visitor(capture, model.frame(), RayFollower::kMaxRays, faces);
+  PhotoVisitor visitor(capture, model.frame(), follower.maxRays(), faces);
   if (tiles == nullptr) {
     visitor.visitAll(settings.photoStride, {}, onPhoto);
   } else {
@@ -232,7 +231,7 @@ void followRays(MeshModel& model, uint32_t level, const Capture& capture, const 
 SurfaceCoverage checkCoverage(MeshModel& model, const Capture& capture, const std::vector<TileShares>& tiles) {
   HoleCounter counter(model);
   PhotoFaces middles(model, counter);
-  PhotoVisitor visitor(capture, model.frame(), RayFollower::kMaxRays, middles);
+  PhotoVisitor visitor(capture, model.frame(), counter.maxRays(), middles);
   for (const int photo : capture.photosIn(Split::train)) {
     std::vector<PixelLattice> lattices;
     for (const PhotoTile& tile : tiles[photo].tiles) {

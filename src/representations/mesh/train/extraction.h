@@ -7,6 +7,7 @@
 #include "representations/mesh/train/face_set.h"
 #include "representations/mesh/train/mesh_model.h"
 #include "scene/capture.h"
+#include "train/image_rays.h"
 #include "train/photo_tiles.h"
 
 namespace tessera {
@@ -26,11 +27,20 @@ struct ExtractionSettings {
 // What looks at the rays of photos, and at parallel ones.
 class RayFollower {
  public:
+  explicit RayFollower(const Device& device) : maxRays_(ImageBatch::on(device).rays) {}
   virtual ~RayFollower() = default;
-  static constexpr uint32_t kMaxRays = 4096;
-  // Follows the first rays of at most kMaxRays, as many as fit the buffers; returns their number, at least 1.
+  uint32_t maxRays() const { return maxRays_; }  // at a time
+  // Follows the first rays of at most maxRays(), as many as fit the buffers; returns their number, at least 1.
   // `weight`: of the rays' directions for the faces that they see.
   virtual uint32_t follow(const MeshRays& rays, float weight) = 0;
+
+ protected:
+  static constexpr uint32_t kMaxHits = 1024;  // of a ray
+  uint32_t maxSamples() const { return kHitsPerRay * maxRays_; }
+
+ private:
+  static constexpr uint32_t kHitsPerRay = 32;  // on average, as long as all rays fit
+  uint32_t maxRays_;
 };
 
 // Marks the faces that rays see.

@@ -13,7 +13,6 @@ namespace tessera {
 namespace {
 
 constexpr uint32_t kFeatures = MeshField::kFeatures;
-constexpr uint32_t kTransferSamples = 1 << 17;
 
 // Of the planes of the triangles in a cell, in coordinates relative to its middle.
 struct Quadric {
@@ -73,22 +72,22 @@ class SurfaceTransfer final : public RayFollower {
  public:
   // Keeps a reference to `model`. reach: the largest distance between both, scene units.
   SurfaceTransfer(MeshModel& model, uint32_t level, double reach)
-      : model_(model),
+      : RayFollower(model.device()),
+        model_(model),
         level_(level),
         reach_(static_cast<float>(reach)),
         patchEdge_(model.atlas()->patchEdge),
         faces_(model.level(level).domain().grids),
-        fine_(model.device(), kMaxRays, kTransferSamples),
-        coarse_(model.device(), kMaxRays, kTransferSamples),
+        fine_(model.device(), maxRays(), maxSamples()),
+        coarse_(model.device(), maxRays(), maxSamples()),
         counters_(model.device().array<uint32_t>(size_t{2} * MeshHits::kCounters)),
-        features_(model.device().array<float>(size_t{kFeatures} * kTransferSamples)) {
+        features_(model.device().array<float>(size_t{kFeatures} * maxSamples())) {
     fine_.counters = counters_.part(0, MeshHits::kCounters);
     coarse_.counters = counters_.part(MeshHits::kCounters, MeshHits::kCounters);
-    model.field().reserve(kTransferSamples);
+    model.field().reserve(maxSamples());
   }
 
   uint32_t follow(const MeshRays& rays, float rayWeight) override {
-    constexpr uint32_t kMaxHits = 1024;  // of a ray
     Device& device = model_.device();
     model_.level(0).trace(rays, kMaxHits, false, fine_);
     model_.level(level_).trace(rays, kMaxHits, false, coarse_);
