@@ -22,7 +22,9 @@
 # Of each run: its time within twice what it had expected at the start, stages within 1.5 times, memory between half and all of it.
 # Resumable: everything is kept in build/bench/photos, and what exists is not made again.
 #   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox served against methods reduced exposure jitter killed survey sizes untagged"] \
-#     [SEEDS="1 2 3"] [MINUTES=10] [METHOD=mesh] bench/photos.sh
+#     [SEEDS="1 2 3"] [MINUTES=10] [STEPS=N] [METHOD=hash] bench/photos.sh
+# With STEPS, trainings have that many steps instead of minutes, so that other programs do not matter; those of killed, 300 if it is
+# not given.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
@@ -30,6 +32,8 @@ data=${TESSERA_SHARED_DATA:?names no folder; it must hold brighton_beach/ and fo
 for name in brighton_beach fox; do [ -d "$data/$name" ] || die "$data/$name: no such folder"; done
 work=$out/photos
 mkdir -p "$work"
+length=(--minutes "${MINUTES:-10}")
+[ -z "${STEPS:-}" ] || length=(--steps "$STEPS")
 
 # posed NAME PHOTOS: finds the poses, and prints minutes and memory of each stage.
 posed() {
@@ -85,8 +89,8 @@ served() {
 # scene_of CAPTURE METHOD SEED VIEWS: trains, bakes, and compares the scene with the held-out photographs of the capture VIEWS;
 # prints PSNR.
 scene_of() {
-  local name=$1-$2-$3
-  trained "$name" "$1" --method "$2" --minutes "${MINUTES:-10}" --seed "$3" >&2
+  local name=$1-$2-$3${STEPS:+-$STEPS}
+  trained "$name" "$1" --method "$2" "${length[@]}" --seed "$3" >&2
   [ -e "$work/$name.scene/tileset.json" ] || "$tessera" bake "$work/$name" "$work/$name.scene" --capture "$work/$1" >&2
   [ -s "$work/$name.json" ] || "$tessera" eval "$work/$name.scene" "$work/$4" --json "$work/$name.json" \
     --report "$work/$name.html" ${lpips:+--lpips "$lpips"} >&2
@@ -112,7 +116,7 @@ methods() {
     for capture in ${CAPTURES:-brighton_beach-2 fox-2 city}; do
       for method in ${METHODS:-volume hash mesh}; do
         scene_of "$capture" "$method" "$seed" "$capture" > "$work/last"
-        described "$capture-$method-$seed"
+        described "$capture-$method-$seed${STEPS:+-$STEPS}"
       done
     done
   done
@@ -120,14 +124,14 @@ methods() {
 
 # By what the photographs are divided, for the same minutes; judged in views that are divided by 2.
 reduced() {
-  local seed downscale name method=${METHOD:-mesh}
+  local seed downscale name method=${METHOD:-hash}
   for seed in ${SEEDS:-1 2 3}; do
     for name in brighton_beach fox; do
       imported "$name-2" "$data/$name" 2
       for downscale in 1 2 4; do
         imported "$name-$downscale" "$data/$name" "$downscale"
         scene_of "$name-$downscale" "$method" "$seed" "$name-2" > "$work/last"
-        described "$name-$downscale-$method-$seed"
+        described "$name-$downscale-$method-$seed${STEPS:+-$STEPS}"
       done
     done
   done
@@ -135,7 +139,7 @@ reduced() {
 
 # against_poses NAME FOLDER DOWNSCALE
 against_poses() {
-  local seed own given differences=() method=${METHOD:-mesh}
+  local seed own given differences=() method=${METHOD:-hash}
   [ -e "$work/$1-own/transforms.json" ] || {
     "$tessera" run "$2/images" "$work/$1-posed" --until capture --downscale "$3" --holdout every:8
     cp -r "$work/$1-posed/capture" "$work/$1-own"
@@ -166,8 +170,8 @@ exposure() {
     "$tessera" import "$data/brighton_beach" "$work/beach" --downscale 4 --holdout every:8
   local seed model neutral predicted
   for seed in ${SEEDS:-1 2 3}; do
-    model=beach-$seed
-    trained "$model" beach --method field --minutes "${MINUTES:-10}" --seed "$seed"
+    model=beach-$seed${STEPS:+-$STEPS}
+    trained "$model" beach --method field "${length[@]}" --seed "$seed"
     neutral=$(exposed "$model" neutral "$model-neutral")
     predicted=$(exposed "$model" predicted "$model-predicted")
     echo "brighton_beach, seed $seed: neutral $neutral dB, predicted $predicted dB"
@@ -192,10 +196,11 @@ jitter() {
   }
   # judged CAPTURE SEED: a model of it, compared with the held-out views without jitter.
   judged() {
-    trained "$1-field-$2" "$1" --method field --minutes "${MINUTES:-10}" --seed "$2" >&2
-    [ -s "$work/$1-$2.json" ] || "$tessera" eval "$work/$1-field-$2" "$work/steady" --json "$work/$1-$2.json" \
-      --report "$work/$1-$2.html" ${lpips:+--lpips "$lpips"} >&2
-    jq .psnr "$work/$1-$2.json"
+    local name=$1-field-$2${STEPS:+-$STEPS}
+    trained "$name" "$1" --method field "${length[@]}" --seed "$2" >&2
+    [ -s "$work/$name.json" ] || "$tessera" eval "$work/$name" "$work/steady" --json "$work/$name.json" \
+      --report "$work/$name.html" ${lpips:+--lpips "$lpips"} >&2
+    jq .psnr "$work/$name.json"
   }
   for seed in ${SEEDS:-1 2 3}; do
     steady+=("$(judged steady "$seed")") jittered+=("$(judged jittered "$seed")") shuffled+=("$(judged shuffled "$seed")")

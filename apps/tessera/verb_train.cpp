@@ -208,8 +208,8 @@ void addTrainVerb(CLI::App& app) {
   verb->add_option("--seed", flags->seed, "seed of all random numbers, a whole number; the same as --set seed=...");
   verb->add_option("--config", flags->configFile, "settings file (TOML)")->check(CLI::ExistingFile);
   verb->add_option("--set", flags->settings, "key=value; may be repeated");
-  verb->add_option("--checkpoint-seconds", flags->loop.checkpointSeconds, "time between checkpoints")
-      ->capture_default_str()
+  verb->add_option("--checkpoint-seconds", flags->loop.checkpointSeconds,
+                   "time between checkpoints; default: a minute, or up to 150 s if one takes more than 3 s")
       ->check(amount(0, 1e9));
   verb->add_flag("--json", flags->json, "print the result as one JSON object");
   addDeviceFlags(*verb, flags->device);

@@ -184,14 +184,12 @@ Bytes encodeSafetensors(const std::map<std::string, TensorView>& tensors,
   std::string text = header.dump(-1, ' ', false, json::error_handler_t::replace);
   text.resize((text.size() + 7) / 8 * 8, ' ');
 
-  Bytes file(8 + text.size() + offset);
-  for (size_t i = 0; i < 8; ++i) file[i] = static_cast<std::byte>(static_cast<uint64_t>(text.size()) >> (8 * i));
-  std::memcpy(file.data() + 8, text.data(), text.size());
-  size_t at = 8 + text.size();
-  for (const auto& [name, tensor] : order) {
-    if (!tensor->bytes.empty()) std::memcpy(file.data() + at, tensor->bytes.data(), tensor->bytes.size());
-    at += tensor->bytes.size();
-  }
+  Bytes file;
+  file.reserve(8 + text.size() + offset);  // rather than filled with zeros, which takes as long as the copies
+  for (size_t i = 0; i < 8; ++i) file.push_back(static_cast<std::byte>(static_cast<uint64_t>(text.size()) >> (8 * i)));
+  const auto append = [&](std::span<const std::byte> bytes) { file.insert(file.end(), bytes.begin(), bytes.end()); };
+  append(std::as_bytes(std::span(text)));
+  for (const auto& [name, tensor] : order) append(tensor->bytes);
   return file;
 }
 

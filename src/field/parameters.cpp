@@ -37,10 +37,6 @@ bool ParameterGroup::allFinite(Device& device) const {
   return std::all_of(all.begin(), all.end(), [](float value) { return std::isfinite(value); });
 }
 
-void TensorSet::addBytes(const std::string& name, TensorType type, std::span<const std::byte> bytes, size_t elements) {
-  tensors_[name] = {type, static_cast<int64_t>(elements), Bytes(bytes.begin(), bytes.end())};
-}
-
 void TensorSet::add(Device& device, const ParameterGroup& group, bool withMoments) {
   add(group.name, device.read(group.values.all()));
   if (!withMoments) return;

@@ -3,6 +3,8 @@
 
 #include <functional>
 #include <map>
+#include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -34,11 +36,14 @@ struct ParameterGroup {
 class TensorSet {
  public:
   template <class T>
-  void add(const std::string& name, const std::vector<T>& values) {
-    addBytes(name, elementTensorType<T>(), std::as_bytes(std::span(values)), values.size());
+  void add(const std::string& name, std::vector<T> values) {
+    const auto owner = std::make_shared<const std::vector<T>>(std::move(values));
+    tensors_[name] = {elementTensorType<T>(), static_cast<int64_t>(owner->size()),
+                      std::as_bytes(std::span<const T>(*owner)), owner};
   }
   void add(const std::string& name, const TensorView& tensor) {
-    addBytes(name, tensor.type, tensor.bytes, static_cast<size_t>(tensor.elements()));
+    const auto owner = std::make_shared<const Bytes>(tensor.bytes.begin(), tensor.bytes.end());
+    tensors_[name] = {tensor.type, tensor.elements(), *owner, owner};
   }
   void add(Device& device, const ParameterGroup& group, bool withMoments);
   Bytes encode(const std::map<std::string, std::string>& metadata) const;
@@ -51,12 +56,12 @@ class TensorSet {
     if constexpr (std::is_same_v<T, int64_t>) return TensorType::i64;
     if constexpr (std::is_same_v<T, double>) return TensorType::f64;
   }
-  void addBytes(const std::string& name, TensorType type, std::span<const std::byte> bytes, size_t elements);
 
   struct Owned {
     TensorType type;
     int64_t elements;
-    Bytes bytes;
+    std::span<const std::byte> bytes;
+    std::shared_ptr<const void> owner;
   };
   std::map<std::string, Owned> tensors_;
 };

@@ -40,17 +40,19 @@ class StepBudget {
  public:
   explicit StepBudget(double minutes, double share = 0.25) : seconds_(minutes * 60), share_(share) {}
 
-  // `seconds`: the time since training began, after `step` steps. Returns the number of steps once it can be
-  // determined, else 0.
-  int64_t observe(int64_t step, double seconds) {
+  // `seconds`: the time since training began, after `step` steps, of which `saving` went into checkpoints. The time
+  // left is taken to be divided likewise. Returns the number of steps once it can be determined, else 0.
+  int64_t observe(int64_t step, double seconds, double saving = 0) {
     if (seconds < 0.8 * share_ * seconds_) return 0;
+    const double stepping = seconds - saving;
     if (measureStep_ < 0) {
       measureStep_ = step;
-      measureStart_ = seconds;
+      measureStart_ = stepping;
     }
     if (seconds < share_ * seconds_ || step < measureStep_ + kMin) return 0;
-    const double perStep = (seconds - measureStart_) / static_cast<double>(step - measureStep_);
-    return step + std::max<int64_t>(0, static_cast<int64_t>((seconds_ - seconds) / perStep));
+    const double perStep = (stepping - measureStart_) / static_cast<double>(step - measureStep_);
+    const double left = (seconds_ - seconds) * stepping / seconds;
+    return step + std::max<int64_t>(0, static_cast<int64_t>(left / perStep));
   }
 
  private:

@@ -70,6 +70,23 @@ TEST(StepBudget, CountsASlowStartTowardsTheTimeButNotTheSpeed) {
   EXPECT_NEAR(static_cast<double>(countPlannedSteps(StepBudget(10), 0.05, 100, &toldAt)), 10000, 5);
 }
 
+// A checkpoint of 8 s every 68 s, one of them within the time in which the speed is measured.
+TEST(StepBudget, CountsCheckpointsByTheirShareOfTheTime) {
+  StepBudget budget(10);
+  int64_t planned = 0, step = 0;
+  double seconds = 0, saving = 0, nextSave = 60;
+  while (planned == 0 || step < planned) {
+    seconds += 0.15;
+    ++step;
+    if (planned == 0) planned = budget.observe(step, seconds, saving);
+    if (seconds < nextSave) continue;
+    seconds += 8;
+    saving += 8;
+    nextSave = seconds + 60;
+  }
+  EXPECT_NEAR(seconds, 600, 15);
+}
+
 TEST(StepBudget, WaitsForEnoughStepsEvenWhenTimeIsShort) {
   int64_t toldAt = 0;
   const int64_t steps = countPlannedSteps(StepBudget(0.001), 0.05, 0, &toldAt);

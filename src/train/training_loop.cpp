@@ -98,6 +98,12 @@ Start startingPoint(TrainableModel& trainable, const ModelFolder& folder, const 
   return {state, 0};
 }
 
+// Returns the time to the next checkpoint if the last one took `saving` seconds.
+double secondsUntilCheckpoint(double saving) {
+  constexpr double kUsual = 60, kLongest = 150, kShare = 0.05;
+  return std::clamp(saving / kShare, kUsual, kLongest);
+}
+
 }  // namespace
 
 void refuseTrainedModel(const ModelFolder& folder, const TrainingLoopOptions& options) {
@@ -131,7 +137,8 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
   StepBudget budget(options.minutes);
   Window window;
   TrainingResult result;
-  double savedAt = 0, totalSamples = 0, totalRays = 0;
+  double savedAt = 0, lastSaving = 0, saving = 0;  // seconds
+  double totalSamples = 0, totalRays = 0;
   const int64_t firstStep = state.step;
   std::optional<Progress> progress;
   if (options.progress) progress.emplace("training", state.plannedSteps, "steps");
@@ -144,12 +151,15 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
                  "train into another folder with a lower --set learning_rate=..., and report it with the capture");
   };
   const auto save = [&] {
+    const double begun = seconds();
     if (trainable.firstNonFinitePart()) throw notANumber("a parameter");
     folder.commit(state, trainable.parts(), [&](uint32_t part) {
       return trainable.isAsSaved(part) ? std::nullopt : std::optional<Bytes>(trainable.save(part));
     });
     options.saved();
     savedAt = seconds();
+    lastSaving = savedAt - begun;
+    saving += lastSaving;
   };
   const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };
   while (unfinished() && !options.stopRequested()) {
@@ -161,7 +171,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
     ++state.step;
     const double now = seconds();
     if (state.plannedSteps == 0) {
-      state.plannedSteps = budget.observe(state.step - firstStep, now);
+      state.plannedSteps = budget.observe(state.step - firstStep, now, saving);
       if (state.plannedSteps != 0) {
         state.plannedSteps += firstStep;
         planMadeAt = state.step;
@@ -176,7 +186,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
       window = Window();
       window.since = now;
     }
-    if (unfinished() && now - savedAt >= options.checkpointSeconds) save();
+    if (unfinished() && now - savedAt >= options.checkpointSeconds.value_or(secondsUntilCheckpoint(lastSaving))) save();
   }
   save();
   result.step = state.step;

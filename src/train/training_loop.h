@@ -47,7 +47,8 @@ struct TrainingLoopOptions {
   std::string method;
   int64_t steps = 0;   // used without minutes; 0: as the resumed run had planned, else kDefaultSteps
   double minutes = 0;  // > 0: the number of steps is derived from it, once, early in training
-  double checkpointSeconds = 60;
+  // Between checkpoints. Nothing: a minute, or up to 150 s if a checkpoint takes more than a twentieth of it.
+  std::optional<double> checkpointSeconds;
   bool resume = false;
   bool progress = true;
   std::function<bool()> stopRequested = [] { return false; };  // true: save and return
