@@ -325,6 +325,8 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
   std::error_code status;
   ThreadPool pool(options.threads);
   if (options.holdout == "auto" && source.splitError) throw *source.splitError;
+  std::set<std::string> dropped;
+  for (const Photo& photo : source.capture.photos) dropped.insert(photo.name);
   const std::vector<PhotoFacts> facts = cleanSource(source, pool);
   Capture& capture = source.capture;
   if (capture.photos.empty()) {
@@ -339,7 +341,13 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
   setExposures(capture, facts);
   scaleCameras(capture, facts, options.downscale);
   fs::create_directories(out, status);
-  dropFailed(source, importPictures(source, facts, out, options, orientation.scale, pool));
+  std::vector<std::string> names;  // the capture has others
+  for (const Photo& photo : capture.photos) names.push_back(photo.name);
+  const Outcomes outcomes = importPictures(source, facts, out, options, orientation.scale, pool);
+  for (size_t i = 0; i < names.size(); ++i)
+    if (outcomes.photos[i] == FileOutcome::ready) dropped.erase(names[i]);
+  options.dropped(dropped);
+  dropFailed(source, outcomes);
   if (capture.photos.empty()) {
     throw Error(from, "", "no photo of it can be decoded", "see the warnings above");
   }

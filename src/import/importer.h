@@ -17,6 +17,7 @@
 #pragma once
 
 #include <functional>
+#include <set>
 #include <string>
 
 #include "base/file.h"
@@ -36,6 +37,8 @@ struct ImportOptions {
   std::string maskCommand;
   // Called before each photo, from several threads. What it throws ends the import, which resumes when run again.
   std::function<void()> look = [] {};
+  // Called once, with the names in the source of those photos that the capture lacks.
+  std::function<void(const std::set<std::string>&)> dropped = [](const std::set<std::string>&) {};
 };
 
 // Throws Error if `source` cannot be imported; if it is a plain folder of photos, the error names the commands to run.

@@ -164,11 +164,15 @@ void PhotoModels::mapRest(const fs::path& models, bool withNeighbours, const Wat
   if (missing.size() >= kLeastShared) {
     const auto separate = mapOnly(models, withNeighbours ? withMatched(missing) : missing, {}, watchMore);
     for (const Piece& piece : separate) {
+      // What does not stand must not count as placed below.
+      if (!isSupported(piece)) removeFolder(piece.folder);
       if (withNeighbours || !isSupported(piece)) continue;
       const std::set<int> linked = withMatched(piece.photos);
       if (linked.size() < piece.photos.size() + kLeastShared) continue;
-      for (const Piece& larger : mapOnly(models, linked, {.model = piece.folder}, watchMore))
-        if (larger.photos.size() >= piece.photos.size()) removeFolder(piece.folder);
+      for (const Piece& larger : mapOnly(models, linked, {.model = piece.folder}, watchMore)) {
+        const bool replaces = isSupported(larger) && larger.photos.size() >= piece.photos.size();
+        removeFolder(replaces ? piece.folder : larger.folder);
+      }
     }
   }
   mapLinked(models, watchMore);
@@ -190,11 +194,25 @@ void PhotoModels::mapLinked(const fs::path& models, const Watch& watch) {
   for (const auto& [photo, count] : links)
     if (count >= kLinks) linked.insert(photo);
   if (linked.empty() || linked.size() * kShareOfMany < list_.photos.size()) return;
+  std::erase_if(beginnings, [&](const auto& beginning) {
+    return !linked.contains(beginning.second.first) && !linked.contains(beginning.second.second);
+  });
   std::sort(beginnings.begin(), beginnings.end(), std::greater<>());
   const std::set<int> photos = withMatched(linked);
-  for (size_t i = 0; i < std::min(kAttempts, beginnings.size()); ++i)
-    for (const Piece& piece : mapOnly(models, photos, {.pair = beginnings[i].second}, watch))
-      if (piece.photos.size() > pieces[0].photos.size() && isSupported(piece)) return;
+  const auto countIn = [](const std::set<int>& some, const std::set<int>& all) {
+    return static_cast<size_t>(std::count_if(some.begin(), some.end(), [&](int p) { return all.contains(p); }));
+  };
+  bool succeeded = false;
+  for (size_t i = 0; i < std::min(kAttempts, beginnings.size()) && !succeeded; ++i) {
+    for (const Piece& piece : mapOnly(models, photos, {.pair = beginnings[i].second}, watch)) {
+      // It must be the new largest one, or be possible to join with that.
+      const bool isUseful =
+          isSupported(piece) && 2 * countIn(linked, piece.photos) > linked.size() &&
+          (countIn(piece.photos, pieces[0].photos) >= kLeastShared || piece.photos.size() > pieces[0].photos.size());
+      if (!isUseful) removeFolder(piece.folder);
+      succeeded = succeeded || isUseful;
+    }
+  }
 }
 
 std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<int>& photos, const Beginning& beginning,
@@ -227,8 +245,10 @@ std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<i
                                      "50"};
   if (!beginning.model.empty()) arguments.insert(arguments.end(), {"--input_path", beginning.model.string()});
   if (const auto& pair = beginning.pair) {
-    arguments.insert(arguments.end(), {"--Mapper.init_image_id1", std::to_string(pair->first + 1),
-                                       "--Mapper.init_image_id2", std::to_string(pair->second + 1)});
+    // Without the limit, all further models would begin with the same pair.
+    arguments.insert(arguments.end(),
+                     {"--Mapper.init_image_id1", std::to_string(pair->first + 1), "--Mapper.init_image_id2",
+                      std::to_string(pair->second + 1), "--Mapper.max_num_models", "1"});
   }
   try {
     runColmap("mapping", std::move(arguments), [&] { watch(lastRegistered(log)); });

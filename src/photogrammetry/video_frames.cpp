@@ -53,6 +53,15 @@ std::string selectFrames(std::span<const int64_t> frames) {
                      selectFrames(frames.subspan(middle)));
 }
 
+// Whether a file is a frame, or was to become one: other files, such as masks, belong to the user.
+bool isFrame(std::string_view name) {
+  constexpr std::string_view kBegin = "frame_", kEnd = ".jpg";
+  if (!name.starts_with(kBegin)) return false;
+  name.remove_prefix(kBegin.size());
+  name.remove_prefix(std::min(name.size(), name.find_first_not_of("0123456789")));
+  return name == kEnd || name.starts_with(".jpg.partial-");
+}
+
 }  // namespace
 
 // A run of ffmpeg that writes pictures to its standard output.
@@ -259,7 +268,7 @@ void VideoFrames::discard() const {
   // The list goes first: without it, no frame counts.
   std::vector<fs::path> files{listFile()};
   for (const auto& entry : fs::directory_iterator(folder_))
-    if (entry.path().filename().string().starts_with("frame_")) files.push_back(entry.path());
+    if (isFrame(entry.path().filename().string())) files.push_back(entry.path());
   for (const fs::path& file : files) {
     fs::remove(file, status);
     if (status) throw Error(file.string(), "", "cannot be removed: " + status.message(), "remove it");

@@ -37,7 +37,7 @@ class PhotoRun {
   explicit PhotoRun(const PhotoRunOptions& options) : options_(options), posed_(PosedSource::open(options_)) {
     if (posed_) return;
     if (!options_.masks.empty()) masks_.emplace(options_.masks);
-    if (masks_ && liesIn(options_.masks, options_.photos)) {
+    if (masks_ && (liesIn(options_.masks, options_.photos) || liesIn(options_.masks, out("frames")))) {
       throw Error("--masks " + options_.masks.string(), "",
                   "is in the folder of photos: masks would be taken for photos", "move it elsewhere");
     }
@@ -332,13 +332,12 @@ class PhotoRun {
   StageOutcome capture() {
     SourceCapture source = posed_ ? posed_->take(out("poses")) : models_->read();
     std::set<std::string> dropped;
-    for (const Photo& photo : source.capture.photos) dropped.insert(photo.name);
-    const Capture capture = importSource(
-        std::move(source), options_.photos.string(), out("capture"),
-        {.downscale = downscale(), .holdout = options_.holdout, .threads = options_.threads, .look = [this] {
-           stopIfInterrupted();
-         }});
-    for (const Photo& photo : capture.photos) dropped.erase(photo.name);
+    const Capture capture = importSource(std::move(source), options_.photos.string(), out("capture"),
+                                         {.downscale = downscale(),
+                                          .holdout = options_.holdout,
+                                          .threads = options_.threads,
+                                          .look = [this] { stopIfInterrupted(); },
+                                          .dropped = [&](const std::set<std::string>& names) { dropped = names; }});
     addLeftOut(leftOutFile(), dropped, "damaged: it ends early, or cannot be decoded");
     const std::string size = downscale() > 1 ? fmt::format(", made smaller by {}", downscale()) : "";
     return {0, fmt::format("{} photos, {} held out{}{}", capture.photos.size(), capture.photosIn(Split::test).size(),

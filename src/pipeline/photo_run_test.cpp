@@ -101,6 +101,22 @@ TEST_F(PhotoRuns, NamePhotosThatTheCaptureLacks) {
   EXPECT_TRUE(contains(leftOut[0].name, "a4.png"));
 }
 
+// In the capture, photos may have other names than in their source.
+TEST_F(PhotoRuns, NameNoPhotoThatTheCaptureHas) {
+  writePosed(9);
+  options_.downscale = 2;
+  std::string poses = readTextFile(options_.photos / "transforms.json");
+  for (int i = 0; i < 9; ++i) {
+    const std::string name = "a" + std::to_string(i) + ".png";
+    fs::rename(options_.photos / "images" / name, options_.photos / name);
+    poses.replace(poses.find("images/" + name), 7 + name.size(), name);
+  }
+  writeFileAtomically(options_.photos / "transforms.json", poses);
+  run();
+  EXPECT_EQ(readLeftOut(options_.out / "poses/left_out.json").size(), 0u);
+  EXPECT_TRUE(fs::exists(options_.out / "capture/images/a4.png"));
+}
+
 TEST_F(PhotoRuns, OfPosedPhotosAreRepeatedIfTheirPlaceOnTheEarthChanges) {
   const auto placed = [&](const char* longitude) {
     writePosed(9, std::string(R"("tessera":{"geo":{"latitude":50,"longitude":)") + longitude +

@@ -141,6 +141,7 @@ SourceCapture PosedSource::take(const fs::path& poses) {
 TrainingNeeds PosedSource::trainingNeeds(int downscale) const {
   TrainingSize size = size_;
   size.photoPixels /= int64_t{downscale} * downscale;
+  size.threads = options_->threads;
   return planTraining(size, options_->costs);
 }
 

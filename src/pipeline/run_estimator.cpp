@@ -99,6 +99,7 @@ TrainingNeeds RunEstimator::trainingNeeds(int downscale) {
   TrainingSize size = trainingSize();
   size.photoPixels /= int64_t{downscale} * downscale;
   size.relativeSeconds = relativeSeconds(rates());
+  size.threads = options_.threads;
   return planTraining(size, options_.costs);
 }
 

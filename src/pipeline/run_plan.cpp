@@ -43,6 +43,13 @@ PhotoList photosToProbe(const PhotoList& list) {
   return chosen;
 }
 
+// Returns the pixels of a photo in which COLMAP looks for features: it reduces larger photos first.
+double extractedPixels(const CameraBody& body) {
+  constexpr double kLongest = 3200;
+  const double factor = std::min(1.0, kLongest / std::max(body.width, body.height));
+  return factor * body.width * factor * body.height;
+}
+
 MatchingRates probe(const PhotoList& chosen, int threads, const fs::path& folder, const std::function<void()>& look) {
   PhotoMatches matches(folder, chosen, {.threads = threads});
   const auto start = SteadyClock::now();
@@ -58,7 +65,7 @@ MatchingRates probe(const PhotoList& chosen, int threads, const fs::path& folder
   const CameraBody& body = chosen.bodies[static_cast<size_t>(chosen.photos.front().body)];
   return {.secondsPerPhoto = Seconds(extracted - start).count() / count,
           .secondsPerPair = Seconds(matched - extracted).count() / static_cast<double>(pairs.size()),
-          .pixelsPerPhoto = static_cast<double>(body.width) * body.height,
+          .pixelsPerPhoto = extractedPixels(body),
           .featuresPerPhoto = static_cast<double>(counts.features) / count,
           .inliersPerPair = static_cast<double>(counts.inliers) / static_cast<double>(pairs.size())};
 }
@@ -170,7 +177,7 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
       isReduced && size.sourcePixels > 0 ? std::min(1.0, 4 * pixels / static_cast<double>(size.sourcePixels)) : 1;
   TrainingNeeds needs;
   // Each thread holds a photo as it was taken, and the smaller one.
-  const auto threads = static_cast<double>(std::max(1u, std::thread::hardware_concurrency()));
+  const double threads = size.threads > 0 ? size.threads : std::max(1u, std::thread::hardware_concurrency());
   const double atOnce = isReduced ? std::min(photos, threads) * static_cast<double>(size.sourcePixels) : 0;
   needs.capture = {
       isReduced ? photos * static_cast<double>(size.sourcePixels) * kImportSeconds * speed : photos * 0.005,
@@ -230,7 +237,7 @@ void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes,
         "stage " + entry.stage, "",
         fmt::format("would take {:.1f} GiB of memory of {:.1f} GiB",
                     static_cast<double>(entry.needs.memoryBytes) / kGiB, static_cast<double>(memoryBytes) / kGiB),
-        "raise --downscale if it is `train`, else use fewer photos; or use a machine with more memory");
+        "raise --downscale if it is `train`, else use fewer --threads or photos; or use a machine with more memory");
   }
 }
 

@@ -72,6 +72,7 @@ struct TrainingSize {
   double minutes = 0;          // of training; or
   int64_t steps = 0;           // steps, if above 0
   double relativeSeconds = 1;  // that this machine takes for what takes two cores one
+  int threads = 0;             // of the import; 0: all
 };
 
 struct TrainingNeeds {

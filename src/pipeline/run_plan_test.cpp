@@ -137,6 +137,7 @@ TEST(RunPlan, RefusesWhatDoesNotFit) {
       "smaller");
   EXPECT_EQ(refusal(1100 * kMiB, 2048 * kMiB),
             "stage train: would take 3.9 GiB of memory of 2.0 GiB; raise --downscale if it is `train`, else use fewer "
+            "--threads or "
             "photos; or use a machine with more memory");
 }
 

@@ -40,9 +40,9 @@ class StepBudget {
  public:
   explicit StepBudget(double minutes, double share = 0.25) : seconds_(minutes * 60), share_(share) {}
 
-  // `seconds`: the time since training began, after `step` steps, of which `saving` went into checkpoints. The time
-  // left is taken to be divided likewise. Returns the number of steps once it can be determined, else 0.
-  int64_t observe(int64_t step, double seconds, double saving = 0) {
+  // `seconds`: the time since training began, after `step` steps, of which `saving` went into checkpoints;
+  // `savingShare`: of the time that is left. Returns the number of steps once it can be determined, else 0.
+  int64_t observe(int64_t step, double seconds, double saving = 0, double savingShare = 0) {
     if (seconds < 0.8 * share_ * seconds_) return 0;
     const double stepping = seconds - saving;
     if (measureStep_ < 0) {
@@ -51,7 +51,7 @@ class StepBudget {
     }
     if (seconds < share_ * seconds_ || step < measureStep_ + kMin) return 0;
     const double perStep = (stepping - measureStart_) / static_cast<double>(step - measureStep_);
-    const double left = (seconds_ - seconds) * stepping / seconds;
+    const double left = (seconds_ - seconds) * (1 - savingShare);
     return step + std::max<int64_t>(0, static_cast<int64_t>(left / perStep));
   }
 

@@ -78,7 +78,7 @@ TEST(StepBudget, CountsCheckpointsByTheirShareOfTheTime) {
   while (planned == 0 || step < planned) {
     seconds += 0.15;
     ++step;
-    if (planned == 0) planned = budget.observe(step, seconds, saving);
+    if (planned == 0) planned = budget.observe(step, seconds, saving, 8.0 / 68);
     if (seconds < nextSave) continue;
     seconds += 8;
     saving += 8;

@@ -161,6 +161,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
     lastSaving = savedAt - begun;
     saving += lastSaving;
   };
+  const auto untilSaving = [&] { return options.checkpointSeconds.value_or(secondsUntilCheckpoint(lastSaving)); };
   const auto unfinished = [&] { return state.plannedSteps == 0 || state.step < state.plannedSteps; };
   while (unfinished() && !options.stopRequested()) {
     const StepReport report = trainable.step(state.step, state.step < planMadeAt ? 0 : state.plannedSteps);
@@ -171,7 +172,8 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
     ++state.step;
     const double now = seconds();
     if (state.plannedSteps == 0) {
-      state.plannedSteps = budget.observe(state.step - firstStep, now, saving);
+      const double savingShare = lastSaving > 0 ? lastSaving / (lastSaving + untilSaving()) : 0;
+      state.plannedSteps = budget.observe(state.step - firstStep, now, saving, savingShare);
       if (state.plannedSteps != 0) {
         state.plannedSteps += firstStep;
         planMadeAt = state.step;
@@ -186,7 +188,7 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
       window = Window();
       window.since = now;
     }
-    if (unfinished() && now - savedAt >= options.checkpointSeconds.value_or(secondsUntilCheckpoint(lastSaving))) save();
+    if (unfinished() && now - savedAt >= untilSaving()) save();
   }
   save();
   result.step = state.step;

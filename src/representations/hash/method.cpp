@@ -64,7 +64,7 @@ const Method& hashMethod() {
       .name = "hash",
       .summary = "hash tables of blocks whose levels are weighed by attention, decoded once a pixel (NGP-RT)",
       .trainsInBlocks = true,
-      .costs = {0.13, 9000, 120, 2, 10, int64_t{1300} << 20, 750000000},
+      .costs = {0.145, 15000, 10, 27, 10, int64_t{1300} << 20, 750000000},
       .settings = makeSettings<HashConfig>,
       .train = train,
       .openModel = openModel,
