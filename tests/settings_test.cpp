@@ -21,8 +21,8 @@ namespace {
 template <class Use>
 void forEachMethod(const Use& use) {
   use("field", FieldConfig());
-  use("volume", VolumeConfig());
   use("hash", HashConfig());
+  use("volume", VolumeConfig());
   use("mesh", MeshConfig());
 }
 

@@ -14,6 +14,15 @@ namespace {
 
 constexpr const char* kRemedy = "use every:N (N at least 2), list:FILE or none";
 
+std::string withoutExtension(fs::path path) {
+  return path.replace_extension("").generic_string();
+}
+
+// Returns a path as it is within the folder of images.
+fs::path innerPath(const fs::path& path) {
+  return path.has_parent_path() && *path.begin() == "images" ? path.lexically_relative("images") : path;
+}
+
 void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
   const std::string text = readTextFile(file);
   std::set<std::string> names;
@@ -26,28 +35,32 @@ void holdOutList(const fs::path& file, std::vector<Photo>& photos) {
   }
   std::set<std::string> matchedNames;
   for (Photo& photo : photos) {
-    const fs::path path(photo.name);
-    const std::string withoutExtension = fs::path(path).replace_extension("").generic_string();
-    for (const std::string& candidate :
-         {photo.name, path.filename().string(), path.stem().string(), withoutExtension}) {
+    const fs::path path(photo.name), inner = innerPath(path);
+    for (const std::string& candidate : {photo.name, inner.generic_string(), path.filename().string(),
+                                         path.stem().string(), withoutExtension(path), withoutExtension(inner)}) {
       if (names.contains(candidate)) {
         photo.split = Split::test;
         matchedNames.insert(candidate);
       }
     }
   }
-  // Lists often give names with the extension that the photo had before it was downscaled.
+  // Lists often give names with the extension that the photo had before it was downscaled, and folders that it was in.
   std::vector<std::string> strangers;
   for (const std::string& name : names) {
     if (matchedNames.contains(name)) continue;
-    const std::string stem = fs::path(name).stem().string();
-    bool matched = false;
+    const fs::path listed(name);
+    std::vector<Photo*> sameStem, samePath;
     for (Photo& photo : photos) {
-      if (fs::path(photo.name).stem() != stem || !fs::path(name).has_extension()) continue;
-      photo.split = Split::test;
-      matched = true;
+      const fs::path path(photo.name);
+      if (path.stem() != listed.stem() || !listed.has_extension()) continue;
+      sameStem.push_back(&photo);
+      if (withoutExtension(innerPath(path)) == withoutExtension(innerPath(listed))) samePath.push_back(&photo);
     }
-    if (!matched) strangers.push_back(name);
+    // Photos of several flights may have the same number: then a folder tells which of them is named.
+    const bool saysFolder = listed.has_parent_path();
+    const std::vector<Photo*>& named = !samePath.empty() || (saysFolder && sameStem.size() > 1) ? samePath : sameStem;
+    for (Photo* photo : named) photo->split = Split::test;
+    if (named.empty()) strangers.push_back(name);
   }
   if (strangers.empty()) return;
   if (strangers.size() == names.size()) {

@@ -94,6 +94,29 @@ TEST_F(Import, HoldsOutEveryEighthInNaturalOrder) {
   }
 }
 
+// As of two flights with a camera that counts from 1 again, reduced so that the extension changes.
+TEST_F(Import, HoldsOutOnlyPhotosOfTheFoldersThatAListNames) {
+  for (const char* flight : {"a", "b"}) {
+    for (int i = 0; i < 3; ++i) {
+      const std::string name = std::string(flight) + "/" + std::to_string(i) + ".jpg";
+      fs::create_directories(source_ / flight);
+      writeJpeg(source_ / name, gradientPicture(16, 12, 3, i));
+      frames_.push_back({name, ""});
+    }
+  }
+  write();
+  const auto heldOut = [&](const std::string& list) {
+    writeFileAtomically(folder_ / "list", list);
+    return run({.downscale = 2, .holdout = "list:" + (folder_ / "list").string()}).photosIn(Split::test);
+  };
+  EXPECT_EQ(heldOut("a/1.jpg\n"), (std::vector<int>{1}));
+  EXPECT_EQ(heldOut("images/b/2.jpg\n"), (std::vector<int>{5}));
+  EXPECT_EQ(heldOut("b/0\n"), (std::vector<int>{3}));
+  EXPECT_EQ(heldOut("a/1.jpg\nc/1.jpg\n"), (std::vector<int>{1}));
+  EXPECT_TRUE(logged("1 of 2 names are not photos of this capture (c/1.jpg)")) << log_;
+  EXPECT_EQ(heldOut("1.jpg\n"), (std::vector<int>{1, 4})) << "of all flights";
+}
+
 TEST_F(Import, KeepsTheSourcesOwnSplitByDefault) {
   for (int i = 0; i < 4; ++i) add("images/" + std::to_string(i) + ".png");
   write(R"(,"train_filenames":["images/0.png","images/1.png","images/2.png"],"val_filenames":["images/3.png"])");

@@ -73,7 +73,8 @@ void PhotoModels::runColmap(const char* step, std::vector<std::string> arguments
 }
 
 void PhotoModels::discardMapped() const {
-  for (const char* name : {"snapshots", "snapshot.begun", "sparse.partial", "rest.partial"})
+  for (const char* name :
+       {"snapshots", "snapshot.begun", "sparse.partial", "sparse.continued", "sparse.whole", "rest.partial"})
     removeFolder(folder_ / name);
 }
 

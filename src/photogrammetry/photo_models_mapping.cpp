@@ -117,23 +117,39 @@ void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool 
 }
 
 void PhotoModels::map(bool resumes, const Watch& watch) {
-  const fs::path partial = folder_ / "sparse.partial";
-  try {
-    runMapper({}, partial, resumes, watch);
-  } catch (const Error&) {
-    // Without any model, the mapper reports failure, too.
-    if (readEnd(folder_ / "mapping.log").find(kNoModel) == std::string::npos) throw;
+  // What the mapper has finished is kept until all is done: the former if it had to go on from a snapshot.
+  const fs::path partial = folder_ / "sparse.partial", continued = folder_ / "sparse.continued",
+                 whole = folder_ / "sparse.whole";
+  const auto discardFinished = [&] {
+    for (const fs::path& folder : {continued, whole}) removeFolder(folder);
+  };
+  if (!resumes) discardFinished();
+  if (!fs::exists(continued) && !fs::exists(whole)) {
+    try {
+      runMapper({}, partial, resumes, watch);
+    } catch (const Error&) {
+      // Without any model, the mapper reports failure, too.
+      if (readEnd(folder_ / "mapping.log").find(kNoModel) == std::string::npos) throw;
+    }
+    const bool wentOn = moveIntoSubfolder(partial);
+    replaceFolder(partial, wentOn ? continued : whole);
   }
-  const bool wentOn = moveIntoSubfolder(partial);
+  const bool wentOn = fs::exists(continued);
+  removeFolder(partial);
+  std::error_code status;
+  fs::copy(wentOn ? continued : whole, partial, fs::copy_options::recursive, status);
+  if (status) throw Error(partial.string(), "", "cannot be written: " + status.message(), "check the disk");
   mapRest(partial, wentOn, watch);
   for (const Piece& piece : piecesIn(partial))
     if (!isSupported(piece)) removeFolder(piece.folder);
   if (piecesIn(partial).empty()) {
+    discardFinished();
     throw Error(
         folder_.string(), "", "no two photos could be placed relative to each other",
         "check that neighbouring photos overlap by more than half, are sharp, and were taken from different places");
   }
   replaceFolder(partial, folder_ / "sparse");
+  discardFinished();
   // What came of the models before.
   discardAdjusted();
   discardJoined();
@@ -181,6 +197,8 @@ void PhotoModels::mapRest(const fs::path& models, bool withNeighbours, const Wat
 void PhotoModels::mapLinked(const fs::path& models, const Watch& watch) {
   constexpr size_t kLinks = 3, kShareOfMany = 10, kAttempts = 4;
   const std::vector<Piece> pieces = piecesIn(models);
+  // From one stop, a turn of the camera looks like a step before a plane: no pair would be better than the first.
+  if (!isSupported(pieces[0])) return;
   const std::set<int> missing = notIn(pieces);
   std::map<int, size_t> links;
   std::vector<std::pair<int, PhotoPair>> beginnings;

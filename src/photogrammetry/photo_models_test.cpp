@@ -133,6 +133,22 @@ TEST_F(PhotoModelsTest, GoOnFromTheLastSnapshotThatIsWhole) {
   EXPECT_EQ(estimated.read().capture.photos.size(), 18u) << "models remain until others replace them";
 }
 
+// An interruption while further models are made costs only these.
+TEST_F(PhotoModelsTest, AreNotMappedAgainIfOnlyFurtherOnesWereInterrupted) {
+  const std::string runs = (folder_ / "runs").string();
+  PhotoModels estimated = models("if [ -n \"$image_list_path\" ]; then sleep 60; fi; echo first >> " + runs +
+                                     "; cp -r " + prepared("a", numbers(0, 20)) + " $output_path/0",
+                                 true);
+  const auto interrupt = [](int64_t photos) {
+    if (photos >= 20) throw std::runtime_error("interrupted");
+  };
+  EXPECT_THROW(estimated.map(false, interrupt), std::runtime_error);
+  EXPECT_THROW(estimated.map(true, interrupt), std::runtime_error);
+  EXPECT_EQ(readTextFile(folder_ / "runs"), "first\n");
+  EXPECT_THROW(estimated.map(false, interrupt), std::runtime_error);
+  EXPECT_EQ(readTextFile(folder_ / "runs"), "first\nfirst\n") << "a new beginning";
+}
+
 TEST_F(PhotoModelsTest, KeepOnlyTheLargestSnapshotsWhileTheMapperRuns) {
   std::string script;
   for (int photos = 10; photos <= 40; photos += 10) {

@@ -11,6 +11,7 @@
 #include "base/testing/temporary_folder.h"
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
+#include "pipeline/posed_source.h"
 
 namespace tessera {
 namespace {
@@ -99,6 +100,15 @@ TEST_F(PhotoRuns, NamePhotosThatTheCaptureLacks) {
   const std::vector<LeftOutPhoto> leftOut = readLeftOut(options_.out / "poses/left_out.json");
   ASSERT_EQ(leftOut.size(), 1u);
   EXPECT_TRUE(contains(leftOut[0].name, "a4.png"));
+}
+
+TEST_F(PhotoRuns, AreNotEvaluatedOnHeldOutPhotosThatAreMissing) {
+  std::string trained;
+  for (int i = 0; i < 8; ++i) trained += std::string(i > 0 ? "," : "") + "\"images/a" + std::to_string(i) + ".png\"";
+  writePosed(9, "\"test_filenames\":[\"images/a8.png\"],\"train_filenames\":[" + trained + "],");
+  EXPECT_TRUE(PosedSource::open(options_)->holdsOut());
+  fs::remove(options_.photos / "images/a8.png");
+  EXPECT_FALSE(PosedSource::open(options_)->holdsOut());
 }
 
 // In the capture, photos may have other names than in their source.

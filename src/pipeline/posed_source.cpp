@@ -62,10 +62,11 @@ std::string describe(const Capture& capture) {
   return textDigest(text + fmt::format("{} {} {}", sum.x(), sum.y(), sum.z()));
 }
 
-int64_t countHeldOut(const SourceCapture& source, const std::string& rule) {
+// `readable`: the photos of the source that the import does not drop.
+int64_t countHeldOut(const SourceCapture& source, std::vector<Photo> readable, const std::string& rule) {
   if (rule == "auto" && source.splitError) throw *source.splitError;
   SourceCapture copy;
-  copy.capture.photos = source.capture.photos;
+  copy.capture.photos = std::move(readable);
   copy.hasOwnSplit = source.hasOwnSplit;
   chooseSplit(copy, rule);
   return static_cast<int64_t>(copy.capture.photosIn(Split::test).size());
@@ -95,6 +96,7 @@ PosedSource::PosedSource(const PhotoRunOptions& options)
   digest_ = textDigest(describe(capture) + flags);
   std::vector<int> sides;
   std::vector<int64_t> pixels;
+  std::vector<Photo> readable;
   for (const Photo& photo : capture.photos) {
     photos_.push_back({.name = photo.name, .file = photo.image});
     std::error_code status;
@@ -105,6 +107,7 @@ PosedSource::PosedSource(const PhotoRunOptions& options)
       const ImageInfo image = probeImageFile(photo.image);
       width = image.width;
       height = image.height;
+      readable.push_back(photo);
     } catch (const Error&) {  // it will be left out
       if (static_cast<size_t>(photo.camera) >= capture.cameras.size()) continue;
       width = capture.cameras[static_cast<size_t>(photo.camera)].width;
@@ -119,7 +122,7 @@ PosedSource::PosedSource(const PhotoRunOptions& options)
   size_.longerSide = upperMedian(sides);
   size_.minutes = options.minutes;
   size_.steps = options.steps;
-  size_.heldOut = countHeldOut(source_, options.holdout);
+  size_.heldOut = countHeldOut(source_, std::move(readable), options.holdout);
 }
 
 SourceCapture PosedSource::take(const fs::path& poses) {

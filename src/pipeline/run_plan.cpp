@@ -142,7 +142,10 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
   const auto bytes = [](double each, double count) { return static_cast<int64_t>(each * count); };
   MatchingNeeds needs;
   const int extracting = extractionThreads(size.threads, size.pixels, usableMemoryBytes());
-  needs.features = {photos * rates.secondsPerPhoto, 32 * kMiB + extractionBytes(extracting, size.pixels),
+  // The few photos that were tried cannot keep more threads busy than they are.
+  const double parallel =
+      static_cast<double>(extracting) / static_cast<double>(std::min(static_cast<int>(kProbed), extracting));
+  needs.features = {photos * rates.secondsPerPhoto / parallel, 32 * kMiB + extractionBytes(extracting, size.pixels),
                     bytes(kBytesPerFeature, features)};
   const double featuresPerPhoto = photos > 0 ? features / photos : 0;
   needs.lookAlikes = {

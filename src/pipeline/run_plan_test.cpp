@@ -51,6 +51,17 @@ TEST(RunPlan, StatesMemoryAboveWhatPosesTookAndBelowTwice) {
   }
 }
 
+TEST(RunPlan, ExpectsMoreThreadsThanPhotosThatWereTriedToBeFaster) {
+  MatchingSize size = kMeasuredRuns[2].size;
+  size.pixels = 10000;  // so that memory limits no thread
+  const auto seconds = [&](int threads) {
+    size.threads = threads;
+    return planMatching(size, kMeasuredRuns[2].rates).features.seconds;
+  };
+  EXPECT_EQ(seconds(5), seconds(2)) << "as the photos that were tried took";
+  EXPECT_NEAR(seconds(10), seconds(5) / 2, 1e-9);
+}
+
 TEST(RunPlan, ExpectsLongerMatchesIfThePhotosThatWereTriedHaveFewFeatures) {
   MatchingSize size = kMeasuredRuns[2].size;
   const double after = planMatching(size, kMeasuredRuns[2].rates).matches.seconds;
