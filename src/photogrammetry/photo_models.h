@@ -67,8 +67,8 @@ class PhotoModels {
   fs::path last(bool adjusted) const;
   // What the mapper begins with: a model that it goes on from, or a pair of photos.
   struct Beginning {
-    fs::path model;
-    std::optional<PhotoPair> pair;
+    fs::path model = {};
+    std::optional<PhotoPair> pair = {};
   };
   // Adds models of the photos that are in none: once there is a model, the mapper begins no other unless a pair is very
   // well connected. Where matches link such a model with placed photos, it is continued with these, so that the models

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "photogrammetry/camera_motion.h"
 #include "photogrammetry/colmap_database.h"
 #include "photogrammetry/photo_models.h"
 
@@ -40,10 +41,11 @@ int64_t lastRegistered(const fs::path& log) {
   return open == text.npos ? 0 : std::atoll(text.c_str() + open + 1);
 }
 
-// Whether the photos of a model see enough points to say how they stand. Those of a camera that only turns see none.
+// Whether the photos of a model see enough points to say how they stand, and those of a camera that moves.
 bool isSupported(const Piece& piece) {
   constexpr uint64_t kLeastPerPhoto = 10;
-  return statedCount(piece.folder / "points3D.bin") >= kLeastPerPhoto * piece.photos.size();
+  return statedCount(piece.folder / "points3D.bin") >= kLeastPerPhoto * piece.photos.size() &&
+         !onlyTurns(readColmapModel(piece.folder));
 }
 
 // Removes all but the snapshots with the most photos: together, they would grow with the square of the number of
@@ -197,7 +199,6 @@ void PhotoModels::mapRest(const fs::path& models, bool withNeighbours, const Wat
 void PhotoModels::mapLinked(const fs::path& models, const Watch& watch) {
   constexpr size_t kLinks = 3, kShareOfMany = 10, kAttempts = 4;
   const std::vector<Piece> pieces = piecesIn(models);
-  // From one stop, a turn of the camera looks like a step before a plane: no pair would be better than the first.
   if (!isSupported(pieces[0])) return;
   const std::set<int> missing = notIn(pieces);
   std::map<int, size_t> links;
