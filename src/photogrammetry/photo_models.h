@@ -81,7 +81,8 @@ class PhotoModels {
   // Adds models of these photos alone, with limits that are less strict than those of `map`, and returns them.
   std::vector<Piece> mapOnly(const fs::path& models, const std::set<int>& photos, const Beginning& beginning,
                              const Watch& watch);
-  std::set<int> notIn(const std::vector<Piece>& pieces) const;
+  std::vector<std::string> mapperArguments(const fs::path& output) const;  // those that all its runs share
+  std::set<int> notIn(const std::vector<Piece>& pieces) const;             // the photos that none of these models has
   // Returns these photos, and those that are well matched with one of them.
   std::set<int> withMatched(std::set<int> photos) const;
   void runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch);

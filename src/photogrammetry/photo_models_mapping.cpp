@@ -71,6 +71,20 @@ bool moveIntoSubfolder(const fs::path& folder) {
 
 }  // namespace
 
+std::vector<std::string> PhotoModels::mapperArguments(const fs::path& output) const {
+  return {"mapper",
+          "--database_path",
+          (folder_ / "database.db").string(),
+          "--image_path",
+          (folder_ / "images").string(),
+          "--output_path",
+          output.string(),
+          "--Mapper.num_threads",
+          settings_.threadsText(),
+          "--Mapper.min_model_size",
+          "3"};
+}
+
 void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch) {
   const fs::path log = folder_ / "mapping.log", snapshots = folder_ / "snapshots", begun = folder_ / "snapshot.begun";
   std::error_code status;
@@ -85,31 +99,12 @@ void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool 
   fs::remove(log, status);
   makeFolder(output);
   makeFolder(snapshots);
-  std::vector<std::string> arguments{"mapper",
-                                     "--database_path",
-                                     (folder_ / "database.db").string(),
-                                     "--image_path",
-                                     (folder_ / "images").string(),
-                                     "--output_path",
-                                     output.string(),
-                                     "--Mapper.num_threads",
-                                     settings_.threadsText(),
-                                     "--Mapper.min_model_size",
-                                     "3",
-                                     "--Mapper.init_min_tri_angle",
-                                     "8",
-                                     "--Mapper.ba_global_function_tolerance",
-                                     "1e-6",
-                                     "--Mapper.ba_global_images_ratio",
-                                     "1.2",
-                                     "--Mapper.ba_global_points_ratio",
-                                     "1.2",
-                                     "--Mapper.ba_global_max_refinements",
-                                     "2",
-                                     "--Mapper.snapshot_path",
-                                     snapshots.string(),
-                                     "--Mapper.snapshot_images_freq",
-                                     std::to_string(kPhotosPerSnapshot)};
+  std::vector<std::string> arguments = mapperArguments(output);
+  arguments.insert(arguments.end(),
+                   {"--Mapper.init_min_tri_angle", "8", "--Mapper.ba_global_function_tolerance", "1e-6",
+                    "--Mapper.ba_global_images_ratio", "1.2", "--Mapper.ba_global_points_ratio", "1.2",
+                    "--Mapper.ba_global_max_refinements", "2", "--Mapper.snapshot_path", snapshots.string(),
+                    "--Mapper.snapshot_images_freq", std::to_string(kPhotosPerSnapshot)});
   const fs::path from = photosIn(begun).empty() ? input : begun;
   if (!from.empty()) arguments.insert(arguments.end(), {"--input_path", from.string()});
   runColmap("mapping", std::move(arguments), [&] {
@@ -119,7 +114,8 @@ void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool 
 }
 
 void PhotoModels::map(bool resumes, const Watch& watch) {
-  // What the mapper has finished is kept until all is done: the former if it had to go on from a snapshot.
+  // What the mapper has finished is kept until all is done: as `continued` if it went on from a snapshot, else as
+  // `whole`.
   const fs::path partial = folder_ / "sparse.partial", continued = folder_ / "sparse.continued",
                  whole = folder_ / "sparse.whole";
   const auto discardFinished = [&] {
@@ -182,9 +178,11 @@ void PhotoModels::mapRest(const fs::path& models, bool withNeighbours, const Wat
   if (missing.size() >= kLeastShared) {
     const auto separate = mapOnly(models, withNeighbours ? withMatched(missing) : missing, {}, watchMore);
     for (const Piece& piece : separate) {
-      // What does not stand must not count as placed below.
-      if (!isSupported(piece)) removeFolder(piece.folder);
-      if (withNeighbours || !isSupported(piece)) continue;
+      if (!isSupported(piece)) {
+        removeFolder(piece.folder);  // so that its photos do not count as placed below
+        continue;
+      }
+      if (withNeighbours) continue;
       const std::set<int> linked = withMatched(piece.photos);
       if (linked.size() < piece.photos.size() + kLeastShared) continue;
       for (const Piece& larger : mapOnly(models, linked, {.model = piece.folder}, watchMore)) {
@@ -245,23 +243,9 @@ std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<i
   const fs::path log = folder_ / "mapping.log";
   std::error_code status;
   fs::remove(log, status);
-  std::vector<std::string> arguments{"mapper",
-                                     "--database_path",
-                                     (folder_ / "database.db").string(),
-                                     "--image_path",
-                                     (folder_ / "images").string(),
-                                     "--output_path",
-                                     rest.string(),
-                                     "--image_list_path",
-                                     list.string(),
-                                     "--Mapper.num_threads",
-                                     settings_.threadsText(),
-                                     "--Mapper.min_model_size",
-                                     "3",
-                                     "--Mapper.init_min_tri_angle",
-                                     "4",
-                                     "--Mapper.init_min_num_inliers",
-                                     "50"};
+  std::vector<std::string> arguments = mapperArguments(rest);
+  arguments.insert(arguments.end(), {"--image_list_path", list.string(), "--Mapper.init_min_tri_angle", "4",
+                                     "--Mapper.init_min_num_inliers", "50"});
   if (!beginning.model.empty()) arguments.insert(arguments.end(), {"--input_path", beginning.model.string()});
   if (const auto& pair = beginning.pair) {
     // Without the limit, all further models would begin with the same pair.

@@ -6,7 +6,7 @@
 // trained and rendered as a model only, and SCENE(name, Name) for one whose models can also be baked to scenes. `name`
 // is the representation's name in --method, manifest.json and tileset.json, the name of its folder and the prefix of
 // its functions; `Name` is the prefix of its types. The first row is the default method of `tessera train`, the first
-// SCENE row that of `tessera run`: the best after ten minutes on two cores (docs/benchmarks.md). A table of methods uses
+// SCENE row that of `tessera run` (chosen by docs/benchmarks.md, "Photographs without poses"). A table of methods uses
 // all rows:
 //
 //     #define METHOD(name, Name) &name##Method(),
