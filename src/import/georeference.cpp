@@ -277,6 +277,122 @@ void finish(const Fixes& fixes, Fit& fit, Georeference& result) {
   }
 }
 
+// What the altitudes of fixes are.
+enum class Heights { aboveTakeOff, absolute, unknown };
+
+struct Fitted {
+  std::optional<Georeference> result;
+  std::string reason;      // if there is none
+  double heightError = 0;  // metres: mean of all fixes, each at most kGpsTolerance
+};
+
+// Returns why these places do not determine a rotation; nothing if they do.
+std::string whyUndetermined(const Points& world, const Points& enu) {
+  if (isLine(world) || isLine(enu)) return "the photos with GPS stand on one line";
+  const double spread = principalDeviations(enu).second;
+  if (spread >= kMinGpsSpread) return "";
+  return fmt::format("the photos lie within about {:.1f} m of one line, too near for the accuracy of GPS", spread);
+}
+
+// Finds the similarity that most fixes agree with.
+Fit fitMost(const Fixes& fixes) {
+  Fit best;
+  const auto n = static_cast<int>(fixes.world.cols());
+  const RandomStream random(1991, 0);
+  constexpr uint64_t kTrials = 1000;
+  for (uint64_t trial = 0; trial < kTrials && static_cast<int>(best.inliers.size()) < n; ++trial) {
+    std::vector<int> sample;
+    for (uint64_t k = 0; sample.size() < 3; ++k) {
+      const auto candidate = static_cast<int>(random.below(trial * 64 + k, static_cast<uint32_t>(n)));
+      if (std::find(sample.begin(), sample.end(), candidate) == sample.end()) sample.push_back(candidate);
+    }
+    const Points from = selectColumns(fixes.world, sample), to = selectColumns(fixes.enu, sample);
+    if (isLine(from) || isLine(to)) continue;
+    Fit fit;
+    fit.enuFromWorld = Eigen::umeyama(from, to);
+    fit.tooHigh.assign(fixes.ofFlight.size(), 0);
+    judge(fixes, fit);
+    // Refine on all inliers: three noisy fixes of nearby photos alone constrain the rotation too weakly.
+    for (int round = 0; round < 3; ++round) refine(fixes, fit);
+    if (fit.inliers.size() > best.inliers.size()) best = std::move(fit);
+  }
+  return best;
+}
+
+// Fits the similarity with the heights of this kind.
+Fitted fitTo(const std::vector<Photo>& photos, const std::vector<int>& flights, Heights heights, bool hasAltitudes) {
+  std::vector<const Photo*> fixed;
+  std::vector<GpsFix> gps;
+  Fixes fixes;
+  double meanRelative = 0, altitudes = 0;
+  int known = 0;
+  for (const Photo& photo : photos) {
+    if (!photo.gps || (heights == Heights::absolute && !photo.gps->hasAltitude)) continue;
+    const auto flight = flights.empty() ? 0 : static_cast<size_t>(flights[static_cast<size_t>(&photo - photos.data())]);
+    if (flight >= fixes.ofFlight.size()) fixes.ofFlight.resize(flight + 1);
+    fixes.ofFlight[flight].push_back(static_cast<int>(fixed.size()));
+    fixes.flight.push_back(static_cast<int>(flight));
+    fixed.push_back(&photo);
+    gps.push_back(*photo.gps);
+    known += photo.gps->hasAltitude ? 1 : 0;
+    if (photo.gps->hasAltitude) altitudes += photo.gps->altitude;
+    meanRelative += photo.gps->relativeAltitude;
+  }
+  const auto n = static_cast<int>(fixed.size());
+  if (n < 3) return {{}, fmt::format("{} photos with GPS; three are needed", n)};
+  meanRelative /= n;
+  Georeference result;
+  result.hasAltitudes = hasAltitudes;
+  result.fixes = n;
+  result.frame = frameAround(gps);
+  if (hasAltitudes) result.frame.altitude = altitudes / known;
+
+  Points &world = fixes.world, &enu = fixes.enu;
+  world.resize(3, n);
+  enu.resize(3, n);
+  for (int i = 0; i < n; ++i) {
+    const GpsFix& fix = gps[static_cast<size_t>(i)];
+    const double altitude = heights == Heights::aboveTakeOff
+                                ? result.frame.altitude + fix.relativeAltitude - meanRelative
+                            : heights == Heights::absolute ? fix.altitude
+                                                           : 0;
+    enu.col(i) = enuFromGps(result.frame, fix.latitude, fix.longitude, altitude);
+    world.col(i) = fixed[static_cast<size_t>(i)]->worldFromCamera.translation;
+  }
+  if (std::string reason = whyUndetermined(world, enu); !reason.empty()) return {{}, std::move(reason)};
+
+  Fit best = fitMost(fixes);
+  if (best.inliers.size() >= 3) {
+    correctFlights(fixes, best);
+    const Rise rise =
+        heights == Heights::aboveTakeOff && hasAltitudes ? medianRise(result.frame, fixed, fixes, best) : Rise{};
+    raise(fixes, best, rise.metres);
+    finish(fixes, best, result);
+    result.middleError = std::hypot(result.middleError, rise.error);
+    for (Georeference::Residual& residual : result.residuals)
+      residual.photo = static_cast<int>(fixed[static_cast<size_t>(residual.photo)] - photos.data());
+  }
+  if (best.inliers.size() < 3 || 2 * static_cast<int>(best.inliers.size()) < n)
+    return {{},
+            fmt::format("only {} of {} GPS fixes agree with the poses to within {} m", best.inliers.size(), n,
+                        kGpsTolerance)};
+  // A wild fix can make photos on a line seem to be spread.
+  const Points agreeing = selectColumns(enu, best.inliers);
+  if (std::string reason = whyUndetermined(selectColumns(world, best.inliers), agreeing); !reason.empty())
+    return {{}, std::move(reason)};
+  result.frame.enuFromWorld = best.enuFromWorld;
+  result.heightsTooHigh = best.tooHigh;
+  result.inliers = static_cast<int>(best.inliers.size());
+  const Points all = differences(fixes, best);
+  result.rmsMetres = selectColumns(all, best.inliers).norm() / std::sqrt(static_cast<double>(best.inliers.size()));
+  const double spread = principalDeviations(agreeing).second;
+  if (result.rmsMetres > spread / 3)
+    return {{},
+            fmt::format("the GPS fixes deviate from the poses by {:.1f} m, over a spread of {:.1f} m", result.rmsMetres,
+                        spread)};
+  return {std::move(result), "", all.row(2).cwiseAbs().cwiseMin(kGpsTolerance).mean()};
+}
+
 }  // namespace
 
 bool Georeference::isBent() const {
@@ -291,108 +407,42 @@ Vec3d enuFromGps(const GeoFrame& frame, double latitude, double longitude, doubl
   return enu;
 }
 
+GeoFrame frameAround(const std::vector<GpsFix>& fixes) {
+  GeoFrame frame;
+  if (fixes.empty()) return frame;
+  std::vector<double> latitudes, longitudes;
+  for (const GpsFix& fix : fixes) {
+    latitudes.push_back(fix.latitude);
+    longitudes.push_back(fix.longitude);
+  }
+  frame.latitude = upperMedian(latitudes);
+  frame.longitude = upperMedian(longitudes);
+  return frame;
+}
+
 std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,
                                          std::string& reason) {
   CHECK((flights.empty() || flights.size() == photos.size()));
-  std::vector<const Photo*> fixed;
-  Fixes fixes;
-  bool allRelative = true;
-  int known = 0, all = 0;  // fixes with altitudes, and all
+  int all = 0, known = 0, relative = 0;  // fixes, those with absolute altitudes, and with heights above take-off
   for (const Photo& photo : photos) {
     if (!photo.gps) continue;
-    allRelative = allRelative && photo.gps->relativeAltitude != 0;
-    known += photo.gps->hasAltitude ? 1 : 0;
     ++all;
+    known += photo.gps->hasAltitude ? 1 : 0;
+    relative += photo.gps->relativeAltitude != 0 ? 1 : 0;
   }
-  Georeference result;
-  result.hasAltitudes = all == 0 || (known > 0 && 2 * known >= all);
-  double meanRelative = 0, altitudes = 0;
-  for (const Photo& photo : photos) {
-    if (!photo.gps || (result.hasAltitudes && !allRelative && !photo.gps->hasAltitude)) continue;
-    const auto flight = flights.empty() ? 0 : static_cast<size_t>(flights[static_cast<size_t>(&photo - photos.data())]);
-    if (flight >= fixes.ofFlight.size()) fixes.ofFlight.resize(flight + 1);
-    fixes.ofFlight[flight].push_back(static_cast<int>(fixed.size()));
-    fixes.flight.push_back(static_cast<int>(flight));
-    fixed.push_back(&photo);
-    result.frame.latitude += photo.gps->latitude;
-    result.frame.longitude += photo.gps->longitude;  // the fit below fails across the antimeridian
-    if (photo.gps->hasAltitude) altitudes += photo.gps->altitude;
-    meanRelative += photo.gps->relativeAltitude;
-  }
-  const auto n = static_cast<int>(fixed.size());
-  result.fixes = n;
-  if (n < 3) {
-    reason = fmt::format("{} photos with GPS; three are needed", n);
-    return std::nullopt;
-  }
-  for (double* mean : {&result.frame.latitude, &result.frame.longitude, &meanRelative}) *mean /= n;
-  if (result.hasAltitudes) result.frame.altitude = altitudes / known;
-
-  Points &world = fixes.world, &enu = fixes.enu;
-  world.resize(3, n);
-  enu.resize(3, n);
-  for (int i = 0; i < n; ++i) {
-    const GpsFix& gps = *fixed[static_cast<size_t>(i)]->gps;
-    double altitude = result.hasAltitudes ? gps.altitude : 0;
-    if (allRelative) altitude = result.frame.altitude + gps.relativeAltitude - meanRelative;
-    enu.col(i) = enuFromGps(result.frame, gps.latitude, gps.longitude, altitude);
-    world.col(i) = fixed[static_cast<size_t>(i)]->worldFromCamera.translation;
-  }
-  if (isLine(world) || isLine(enu)) {
-    reason = "the photos with GPS stand on one line";
-    return std::nullopt;
-  }
-  const double spread = principalDeviations(enu).second;
-  if (spread < kMinGpsSpread) {
-    reason = fmt::format("the photos lie within about {:.1f} m of one line, too near for the accuracy of GPS", spread);
-    return std::nullopt;
-  }
-
-  Fit best;
-  const RandomStream random(1991, 0);
-  constexpr uint64_t kTrials = 1000;
-  for (uint64_t trial = 0; trial < kTrials && static_cast<int>(best.inliers.size()) < n; ++trial) {
-    std::vector<int> sample;
-    for (uint64_t k = 0; sample.size() < 3; ++k) {
-      const auto candidate = static_cast<int>(random.below(trial * 64 + k, static_cast<uint32_t>(n)));
-      if (std::find(sample.begin(), sample.end(), candidate) == sample.end()) sample.push_back(candidate);
+  const bool hasAltitudes = all == 0 || (known > 0 && 2 * known >= all), allRelative = relative == all;
+  const Heights absolute = hasAltitudes ? Heights::absolute : Heights::unknown;
+  Fitted best = fitTo(photos, flights, allRelative ? Heights::aboveTakeOff : absolute, hasAltitudes);
+  if (allRelative && all > 0 && known == all) {
+    constexpr double kClearly = 0.7, kNothing = 0.05;  // share; metres
+    Fitted other = fitTo(photos, flights, Heights::absolute, hasAltitudes);
+    if (other.result && (!best.result || other.heightError + kNothing < kClearly * best.heightError)) {
+      best = std::move(other);
+      best.result->ignoresTakeOff = true;
     }
-    const Points from = selectColumns(world, sample), to = selectColumns(enu, sample);
-    if (isLine(from) || isLine(to)) continue;
-    Fit fit;
-    fit.enuFromWorld = Eigen::umeyama(from, to);
-    fit.tooHigh.assign(fixes.ofFlight.size(), 0);
-    judge(fixes, fit);
-    // Refine on all inliers: three noisy fixes of nearby photos alone constrain the rotation too weakly.
-    for (int round = 0; round < 3; ++round) refine(fixes, fit);
-    if (fit.inliers.size() > best.inliers.size()) best = std::move(fit);
   }
-  if (best.inliers.size() >= 3) {
-    correctFlights(fixes, best);
-    const Rise rise = allRelative && result.hasAltitudes ? medianRise(result.frame, fixed, fixes, best) : Rise{};
-    raise(fixes, best, rise.metres);
-    finish(fixes, best, result);
-    result.middleError = std::hypot(result.middleError, rise.error);
-    for (Georeference::Residual& residual : result.residuals)
-      residual.photo = static_cast<int>(fixed[static_cast<size_t>(residual.photo)] - photos.data());
-  }
-  if (best.inliers.size() < 3 || 2 * static_cast<int>(best.inliers.size()) < n ||
-      isLine(selectColumns(world, best.inliers))) {
-    reason = fmt::format("only {} of {} GPS fixes agree with the poses to within {} m", best.inliers.size(), n,
-                         kGpsTolerance);
-    return std::nullopt;
-  }
-  result.frame.enuFromWorld = best.enuFromWorld;
-  result.heightsTooHigh = best.tooHigh;
-  result.inliers = static_cast<int>(best.inliers.size());
-  const Points residuals = selectColumns(differences(fixes, best), best.inliers);
-  result.rmsMetres = residuals.norm() / std::sqrt(static_cast<double>(best.inliers.size()));
-  if (result.rmsMetres > spread / 3) {
-    reason = fmt::format("the GPS fixes deviate from the poses by {:.1f} m, over a spread of {:.1f} m",
-                         result.rmsMetres, spread);
-    return std::nullopt;
-  }
-  return result;
+  reason = best.reason;
+  return best.result;
 }
 
 }  // namespace tessera

@@ -24,8 +24,11 @@ struct Georeference {
     double metres = 0, error = 0;
   };
 
-  GeoFrame frame;            // origin: the mean of the photos' fixes; enuFromWorld: the similarity
+  // Origin: the median latitude and longitude and the mean altitude of the photos' fixes; enuFromWorld: the similarity.
+  GeoFrame frame;
   bool hasAltitudes = true;  // false: most fixes state none, and all altitudes are taken to be 0
+  // Whether heights above take-off fit the poses clearly worse than absolute altitudes, and are not used.
+  bool ignoresTakeOff = false;
   int inliers = 0, fixes = 0;
   double rmsMetres = 0;                // of the inliers, in three dimensions
   std::vector<double> heightsTooHigh;  // by flight: metres by which its altitudes are too high, corrected
@@ -48,14 +51,20 @@ inline constexpr double kMinGpsSpread = 5;  // metres
 // Returns the similarity from the photos' world to metres east, north and up. Returns nothing, with the reason in
 // `reason`, if there are fewer than three fixes, if they lie on one line (the rotation about it is undetermined) or too
 // near one (standard deviation across it below kMinGpsSpread, where the fit would follow noise), if fewer than half of
-// them agree within kGpsTolerance, or if the residual exceeds a third of that deviation. Altitudes are the drone's
-// heights above take-off where every photo has one (its barometer is far more precise than GPS), shifted to agree with
-// the median of the absolute altitudes. Horizontal coordinates and heights count by their deviations from the fit.
-// If only some fixes lack an absolute altitude, they are not used, unless all have heights above take-off. `flights`:
-// the flight of each photo, from 0 on; empty: all are of one. Altitudes of one flight may be wrong by the
-// same height (GPS jumps, and take-off places differ), which is estimated for flights of three fixes or more.
+// them agree within kGpsTolerance, if those that agree lie so, or if the residual exceeds a third of that deviation.
+// Altitudes are the drone's heights above take-off where every photo has one (its barometer is far more precise than
+// GPS), shifted to agree with the median of the absolute altitudes; but the absolute ones if these fit the poses
+// clearly better, as those of flights that took off at other heights do. Horizontal coordinates and heights count by
+// their deviations from the fit. If only some fixes lack an absolute altitude, they are not used, unless all have
+// heights above take-off. `flights`: the flight of each photo, from 0 on; empty: all are of one. Altitudes of one
+// flight may be wrong by the same height (GPS jumps, and take-off places differ), which is estimated for flights of
+// three fixes or more.
 std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,
                                          std::string& reason);
+
+// Returns a frame whose origin is the median latitude and longitude of the fixes, at altitude 0: a place among them,
+// also across the antimeridian and with wild fixes. With the identity as similarity.
+GeoFrame frameAround(const std::vector<GpsFix>& fixes);
 
 // Returns the position of a fix in the frame's tangent plane: metres east, north and up. Latitude and longitude are in
 // degrees (WGS 84), the altitude in metres with the same reference as the frame's.

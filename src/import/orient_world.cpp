@@ -101,6 +101,8 @@ Up findUp(const std::vector<Photo>& photos, const std::vector<UprightTags>& tags
 void warnOfHeights(const SourceCapture& source, const Georeference& fit) {
   if (!fit.hasAltitudes)
     warn("GPS states no altitudes: the cameras are taken to be at height 0 of the Earth, on average");
+  if (fit.ignoresTakeOff)
+    warn("absolute altitudes are used: those above take-off do not fit the poses (did flights start elsewhere?)");
   for (size_t flight = 0; flight < fit.heightsTooHigh.size(); ++flight) {
     const double metres = fit.heightsTooHigh[flight];
     if (metres == 0) continue;

@@ -4,6 +4,7 @@
 
 #include <Eigen/Dense>
 #include <GeographicLib/LocalCartesian.hpp>
+#include <algorithm>
 #include <cmath>
 
 #include "base/random.h"
@@ -82,12 +83,23 @@ TEST(Orient, FindsEastNorthUpInMetresFromGps) {
 }
 
 TEST(Orient, RecentresAtTheMedianCamera) {
-  SourceCapture source = flight();
-  scramble(source);
-  orientWorld(source, {});
-  Vec3d mean = Vec3d::Zero();
-  for (const Photo& photo : source.capture.photos) mean += photo.worldFromCamera.translation / 20;
-  EXPECT_LT(mean.norm(), 15);
+  for (const bool hasGps : {true, false}) {
+    SourceCapture source = flight();
+    for (Photo& photo : source.capture.photos)
+      if (!hasGps) photo.gps.reset();
+    scramble(source);
+    orientWorld(source, {});
+    for (int axis = 0; axis < 3; ++axis) {
+      int below = 0, above = 0;
+      for (const Photo& photo : source.capture.photos) {
+        below += photo.worldFromCamera.translation[axis] < 0 ? 1 : 0;
+        above += photo.worldFromCamera.translation[axis] > 0 ? 1 : 0;
+      }
+      EXPECT_LE(below, 10) << axis;
+      EXPECT_LE(above, 10) << axis;
+      EXPECT_GT(below, 0) << axis;
+    }
+  }
 }
 
 TEST(Orient, ToleratesNoiseAndAThirdOfWildFixes) {
@@ -339,6 +351,100 @@ TEST(Georeference, TakesTheLevelFromAbsoluteAltitudes) {
   const Vec3d first =
       (fit->frame.enuFromWorld * source.capture.photos[0].worldFromCamera.translation.homogeneous()).head<3>();
   EXPECT_NEAR(first.z() + fit->frame.altitude, 160, 0.05);
+}
+
+// Five flights one behind the other up a slope, each from a take-off 12 m higher: by their heights above take-off all
+// are level, which a world tilted by 2.2 degrees fits to within a few metres.
+SourceCapture flightsUpASlope(bool tellsFlights) {
+  SourceCapture source;
+  const GeographicLib::LocalCartesian local(50, 8, 100);
+  for (int i = 0; i < 150; ++i) {
+    const int flight = i / 30;
+    Photo photo;
+    const Vec3d at(10.0 * (i / 3) + 5, 30.0 * (i % 3), 80 + 12 * flight + i % 2);
+    photo.worldFromCamera = nadirPose(at, 0);
+    GpsFix fix;
+    local.Reverse(at.x(), at.y(), at.z(), fix.latitude, fix.longitude, fix.altitude);
+    fix.relativeAltitude = 80 + i % 2;
+    photo.gps = fix;
+    source.capture.photos.push_back(photo);
+    if (tellsFlights) source.flight.push_back(flight);
+  }
+  return source;
+}
+
+TEST(Georeference, TakesAbsoluteAltitudesIfFlightsTookOffAtOtherHeights) {
+  for (const bool tellsFlights : {true, false}) {
+    SourceCapture source = flightsUpASlope(tellsFlights);
+    scramble(source);
+    std::string reason;
+    const auto fit = georeference(source.capture.photos, source.flight, reason);
+    ASSERT_TRUE(fit.has_value()) << reason;
+    EXPECT_TRUE(fit->ignoresTakeOff);
+    EXPECT_EQ(fit->inliers, 150);
+    orientWorld(source, {});
+    for (const Photo& photo : source.capture.photos)
+      EXPECT_GT(-photo.worldFromCamera.rotation.col(2).z(), std::cos(0.05 * M_PI / 180));
+  }
+}
+
+// Absolute altitudes that jump from flight to flight, of flights from one place.
+TEST(Georeference, KeepsHeightsAboveTakeOffIfAbsoluteAltitudesJump) {
+  SourceCapture source = flightsUpASlope(true);
+  for (size_t i = 0; i < 150; ++i) {
+    GpsFix& gps = *source.capture.photos[i].gps;
+    gps.relativeAltitude += 12.0 * static_cast<double>(i / 30);
+    gps.altitude += i / 30 % 2 == 0 ? 2 : -2;
+  }
+  scramble(source);
+  std::string reason;
+  const auto fit = georeference(source.capture.photos, source.flight, reason);
+  ASSERT_TRUE(fit.has_value()) << reason;
+  EXPECT_FALSE(fit->ignoresTakeOff);
+  EXPECT_LT(fit->verticalDeviation, 0.1);
+}
+
+TEST(Georeference, WorksAcrossTheAntimeridian) {
+  SourceCapture source = flight();
+  for (Photo& photo : source.capture.photos) {
+    photo.gps->longitude = std::remainder(photo.gps->longitude + 172 - 0.0005, 360);
+    photo.gps->latitude -= 67;
+  }
+  const auto isWest = [](const Photo& photo) { return photo.gps->longitude < 0; };
+  const auto west = std::count_if(source.capture.photos.begin(), source.capture.photos.end(), isWest);
+  ASSERT_GT(west, 4);
+  ASSERT_LT(west, 16);
+  const double stretch =
+      std::cos(17 * M_PI / 180) / std::cos(50 * M_PI / 180);  // a degree of longitude is longer there
+  for (Photo& photo : source.capture.photos) photo.worldFromCamera.translation.x() *= stretch;
+  scramble(source);
+  std::string reason;
+  const auto fit = georeference(source.capture.photos, {}, reason);
+  ASSERT_TRUE(fit.has_value()) << reason;
+  EXPECT_NEAR(std::abs(fit->frame.longitude), 180, 0.01);
+  orientWorld(source, {});
+  for (const Photo& photo : source.capture.photos) EXPECT_LT(photo.worldFromCamera.rotation.col(2).z(), -0.999);
+}
+
+TEST(Georeference, RejectsAStripDespiteAWildFix) {
+  SourceCapture source;
+  const GeographicLib::LocalCartesian local(50, 8, 100);
+  const RandomStream random(11, 2);
+  for (uint64_t i = 0; i < 20; ++i) {
+    const auto noise = [&](uint64_t k, double size) { return size * (random.uniformDouble(8 * i + k) - 0.5); };
+    Photo photo;
+    const Vec3d at(5.0 * static_cast<double>(i), noise(0, 6), 60);
+    photo.worldFromCamera = nadirPose(at, 0);
+    GpsFix fix;
+    local.Reverse(at.x() + noise(1, 4), at.y() + noise(2, 4) + (i == 7 ? 300 : 0), at.z() + noise(3, 2), fix.latitude,
+                  fix.longitude, fix.altitude);
+    photo.gps = fix;
+    source.capture.photos.push_back(photo);
+  }
+  scramble(source);
+  std::string reason;
+  EXPECT_FALSE(georeference(source.capture.photos, {}, reason).has_value());
+  EXPECT_NE(reason.find("of one line, too near"), std::string::npos) << reason;
 }
 
 TEST(Georeference, RejectsFixesThatDoNotDetermineARotation) {

@@ -35,6 +35,7 @@ Json toJson(const Georeference& fit, const SourceCapture& source) {
        {{"latitude", fit.frame.latitude}, {"longitude", fit.frame.longitude}, {"altitude", fit.frame.altitude}}},
       {"enu_from_model", std::move(matrix)},
       {"has_altitudes", fit.hasAltitudes},
+      {"ignores_take_off", fit.ignoresTakeOff},
       {"fixes", fit.fixes},
       {"agreeing", fit.inliers},
       {"rms_metres", fit.rmsMetres},
@@ -103,6 +104,8 @@ GeoreferenceFile parseGeoreference(const Json& json) {
     return parsed;
   }
   parsed.hasAltitudes = toBool(member(json, "has_altitudes"));
+  if (json.contains("ignores_take_off"))
+    parsed.ignoresTakeOff = toBool(json["ignores_take_off"]);  // earlier ones lack it
   parsed.fixes = toCount(member(json, "fixes"));
   parsed.inliers = toCount(member(json, "agreeing"));
   if (parsed.inliers > parsed.fixes) throw Damaged();

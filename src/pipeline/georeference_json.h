@@ -21,7 +21,7 @@ struct GeoreferenceFile {
     bool isInlier = false;
   };
   // As in Georeference.
-  bool hasAltitudes = true;
+  bool hasAltitudes = true, ignoresTakeOff = false;
   int inliers = 0, fixes = 0;
   double rmsMetres = 0;
   double horizontalDeviation = 0, verticalDeviation = 0;

@@ -30,6 +30,7 @@ class GeoreferenceJson : public testing::Test {
     fit.frame.enuFromWorld(0, 3) = 7;
     fit.inliers = 1;
     fit.fixes = 2;
+    fit.ignoresTakeOff = true;
     fit.rmsMetres = 0.5;
     fit.heightsTooHigh = {0, 15};
     fit.residuals = {{1, {1, 2, 3}, {0.3, 0.3, 0.4}, true}, {2, {100, 0, -3}, {0.3, 0.3, 0.4}, false}};
@@ -53,6 +54,7 @@ TEST_F(GeoreferenceJson, ReadsWhatItWrites) {
   EXPECT_EQ(read.inliers, 1);
   EXPECT_EQ(read.fixes, 2);
   EXPECT_EQ(read.rmsMetres, 0.5);
+  EXPECT_TRUE(read.ignoresTakeOff);
   EXPECT_EQ(read.heightsTooHigh, (std::vector<double>{0, 15}));
   EXPECT_EQ(read.horizontalDeviation, 0.3);
   EXPECT_EQ(read.verticalDeviation, 0.4);
@@ -105,7 +107,7 @@ TEST_F(GeoreferenceJson, IsRefusedIfItIsDamaged) {
     damaged[key] = "text";
     expectRefused(damaged.dump());
     damaged.erase(key);
-    if (key != "bend") expectRefused(damaged.dump());
+    if (key != "bend" && key != "ignores_take_off") expectRefused(damaged.dump());
   }
   for (const auto& [key, value] : whole["residuals"][0].items()) {
     auto damaged = whole;
