@@ -4,10 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <numeric>
 #include <set>
 
+#include "base/error.h"
 #include "base/file.h"
 #include "base/image_io.h"
 #include "base/log.h"
@@ -15,20 +15,14 @@
 namespace tessera {
 namespace {
 
-// EXIF (with thumbnails), XMP and the size precede the image data and take far fewer bytes than this.
-constexpr size_t kHeadBytes = size_t{1} << 20;
-
-Bytes readHead(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  Bytes head(kHeadBytes);
-  in.read(reinterpret_cast<char*>(head.data()), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<size_t>(std::max<std::streamsize>(in.gcount(), 0)));
-  return head;
-}
-
 PhotoFacts readPhotoFacts(const Photo& photo) {
   PhotoFacts facts;
-  const Bytes head = readHead(photo.image);
+  Bytes head;
+  try {
+    head = readPhotoHead(photo.image);
+  } catch (const Error&) {
+    return facts;
+  }
   const auto info = probeImage(head);
   if (!info || info->format == ImageInfo::Format::exr) return facts;
   facts.width = info->width;

@@ -7,6 +7,9 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <numbers>
+
+#include "base/image_io.h"
 
 namespace tessera {
 namespace {
@@ -27,11 +30,19 @@ const ExifEntry* gpsEntry(const ExifData& data, int tag, ExifFormat format, unsi
   return findEntry(data, EXIF_IFD_GPS, tag, format, components);
 }
 
+// Returns nothing if the number is unknown: its denominator is 0.
 std::optional<double> rational(const ExifData& data, const ExifEntry& entry, size_t index) {
   const ExifRational value =
       exif_get_rational(entry.data + 8 * index, exif_data_get_byte_order(const_cast<ExifData*>(&data)));
-  if (value.denominator == 0) return value.numerator == 0 ? std::optional(0.0) : std::nullopt;
+  if (value.denominator == 0) return std::nullopt;
   return static_cast<double>(value.numerator) / value.denominator;
+}
+
+// The same, but 0/0 is 0, as it is written for minutes and seconds that the numbers in front of them include.
+std::optional<double> rationalOrZero(const ExifData& data, const ExifEntry& entry, size_t index) {
+  const ExifRational value =
+      exif_get_rational(entry.data + 8 * index, exif_data_get_byte_order(const_cast<ExifData*>(&data)));
+  return value.numerator == 0 ? std::optional(0.0) : rational(data, entry, index);
 }
 
 // Reads an angle of degrees, minutes and seconds, negative if the reference letter is `negative`.
@@ -39,8 +50,8 @@ std::optional<double> angle(const ExifData& data, int tag, int referenceTag, cha
   const ExifEntry* entry = gpsEntry(data, tag, EXIF_FORMAT_RATIONAL, 3);
   const ExifEntry* reference = gpsEntry(data, referenceTag, EXIF_FORMAT_ASCII, 1);
   if (entry == nullptr || reference == nullptr) return std::nullopt;
-  const auto degrees = rational(data, *entry, 0), minutes = rational(data, *entry, 1),
-             seconds = rational(data, *entry, 2);
+  const auto degrees = rational(data, *entry, 0), minutes = rationalOrZero(data, *entry, 1),
+             seconds = rationalOrZero(data, *entry, 2);
   if (!degrees || !minutes || !seconds) return std::nullopt;
   const double value = *degrees + *minutes / 60 + *seconds / 3600;
   return static_cast<char>(reference->data[0]) == negative ? -value : value;
@@ -99,6 +110,8 @@ CameraTags readCamera(const ExifData& data) {
   const double resolution = positive(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_X_RESOLUTION);
   const double unit = positive(data, EXIF_IFD_EXIF, EXIF_TAG_FOCAL_PLANE_RESOLUTION_UNIT);
   camera.pixelsPerMillimetre = unit == 3 ? resolution / 10 : unit == 4 ? resolution : resolution / 25.4;
+  camera.recordedPixels = std::max(positive(data, EXIF_IFD_EXIF, EXIF_TAG_PIXEL_X_DIMENSION),
+                                   positive(data, EXIF_IFD_EXIF, EXIF_TAG_PIXEL_Y_DIMENSION));
   return camera;
 }
 
@@ -122,6 +135,16 @@ std::optional<double> readTime(const ExifData& data) {
     unit /= 10;
   }
   return 86400.0 * static_cast<double>(days) + 3600 * hour + 60 * minute + second + part;
+}
+
+// Whether EXIF, which has fewer digits, states the place of the XMP. A place that another program has corrected stands
+// in EXIF alone.
+bool isSamePlace(const GpsFix& exif, double latitude, double longitude) {
+  constexpr double kMetresPerDegree = 111320, kRounding = 0.5;  // metres
+  const double north = kMetresPerDegree * (latitude - exif.latitude);
+  const double east =
+      kMetresPerDegree * std::remainder(longitude - exif.longitude, 360) * std::cos(latitude * std::numbers::pi / 180);
+  return std::hypot(north, east) <= kRounding;
 }
 
 bool makesSense(const GpsFix& fix) {
@@ -162,13 +185,15 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
   if (end != text.npos) {
     const XmpTags xmp = decodeXmp(text.substr(begin, end - begin));
     // Receivers with corrections write more digits there than in EXIF.
-    if (xmp.latitude && xmp.longitude) {
+    const bool isCorrected = tags.gps && makesSense(*tags.gps) && xmp.latitude && xmp.longitude &&
+                             !isSamePlace(*tags.gps, *xmp.latitude, *xmp.longitude);
+    if (xmp.latitude && xmp.longitude && !isCorrected) {
       GpsFix fix = tags.gps.value_or(GpsFix{.hasAltitude = false});
       fix.latitude = *xmp.latitude;
       fix.longitude = *xmp.longitude;
       if (makesSense(fix)) tags.gps = fix;
     }
-    if (tags.gps && xmp.absoluteAltitude) {
+    if (tags.gps && xmp.absoluteAltitude && !(isCorrected && tags.gps->hasAltitude)) {
       tags.gps->altitude = *xmp.absoluteAltitude;
       tags.gps->hasAltitude = true;
     }
@@ -183,6 +208,14 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
   }
   if (tags.gps && !makesSense(*tags.gps)) tags.gps.reset();
   return tags;
+}
+
+Bytes readPhotoHead(const fs::path& file) {
+  constexpr uint64_t kUsual = uint64_t{1} << 20, kMax = uint64_t{1} << 25;
+  Bytes head = readFileStart(file, kUsual);
+  const bool isJpeg = head.size() == kUsual && head[0] == std::byte{0xff} && head[1] == std::byte{0xd8};
+  if (isJpeg && !probeImage(head)) head = readFileStart(file, kMax);
+  return head;
 }
 
 }  // namespace tessera

@@ -25,6 +25,7 @@ struct CameraTags {
   double focalLength = 0;          // millimetres
   double focalLength35 = 0;        // millimetres, of a camera with the same field of view and a picture of 36 × 24 mm
   double pixelsPerMillimetre = 0;  // of the sensor, along its width
+  double recordedPixels = 0;       // of the longer side of the picture as the camera wrote it; it may be reduced since
   bool isThermal = false;          // an infrared camera beside the one for visible light, as the XMP says
 
   bool isPanorama = false;  // the picture is a map of the sphere around the camera, as the XMP says
@@ -50,8 +51,13 @@ struct PhotoTags {
 std::optional<double> exposureStops(const ExposureTags& exposure);
 
 // Decodes the tags of a JPEG file from its untrusted bytes (all of them, or the first part). Missing and implausible
-// tags are empty.
+// tags are empty. The position and altitude of XMP, which has more digits, precede those of EXIF, unless the position
+// of EXIF is another one: programs that correct positions write only there.
 PhotoTags decodePhotoTags(std::span<const std::byte> jpeg);
+
+// Returns the first part of a photo's file, which contains its tags and tells its size: 1 MiB, or up to 32 MiB of a
+// JPEG whose tags need so much, such as depth maps and thermal pictures. Throws Error if the file cannot be read.
+Bytes readPhotoHead(const fs::path& file);
 
 // The tags of the XMP packet, given as attributes (drone-dji:GpsLatitude="+1.5") or as elements
 // (<drone-dji:GpsLatitude>).

@@ -118,6 +118,23 @@ TEST(Exif, TellsThatTheAltitudeIsUnknown) {
   EXPECT_FALSE(tags.gps->hasAltitude);
 }
 
+// Of receivers that know their height or their place only in part.
+TEST(Exif, TakesZeroOverZeroForUnknown) {
+  const auto read = [](const std::vector<uint32_t>& latitude, const std::vector<uint32_t>& altitude) {
+    ExifBuilder builder;
+    builder.entry(1, 2, 2, {'N', 0}).rationals(2, latitude);
+    builder.entry(3, 2, 2, {'E', 0}).rationals(4, {8, 1, 15, 1, 0, 1});
+    builder.entry(5, 1, 1, {0}).rationals(6, altitude);
+    return decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, builder.exif())).gps;
+  };
+  ASSERT_TRUE(read({505, 10, 0, 0, 0, 0}, {0, 0}).has_value());
+  EXPECT_EQ(read({505, 10, 0, 0, 0, 0}, {0, 0})->latitude, 50.5);
+  EXPECT_FALSE(read({505, 10, 0, 0, 0, 0}, {0, 0})->hasAltitude);
+  EXPECT_TRUE(read({505, 10, 0, 0, 0, 0}, {0, 1})->hasAltitude) << "at the sea";
+  EXPECT_FALSE(read({0, 0, 0, 0, 0, 0}, {1, 1}).has_value());
+  EXPECT_FALSE(read({50, 1, 7, 0, 0, 0}, {1, 1}).has_value());
+}
+
 TEST(Exif, ReadsGpsWithItsReferences) {
   const PhotoTags tags = decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, southWest().exif()));
   ASSERT_TRUE(tags.gps.has_value());
@@ -191,10 +208,16 @@ TEST(Exif, PrefersThePositionOfXmpUnlessItMakesNoSense) {
     jpeg.insert(jpeg.end(), begin, begin + packet.size());
     return decodePhotoTags(jpeg).gps;
   };
-  const auto precise = read("a:GpsLatitude=\"50.12345678\" a:GpsLongitude=\"8.5\"");
+  const auto precise = read("a:GpsLatitude=\"-50.51000123\" a:GpsLongitude=\"-0.25000123\"");
   ASSERT_TRUE(precise.has_value());
-  EXPECT_EQ(precise->latitude, 50.12345678);
+  EXPECT_EQ(precise->latitude, -50.51000123);
   EXPECT_EQ(precise->altitude, -12.5) << "that of EXIF, as there is no other";
+  const std::string altitude = " a:AbsoluteAltitude=\"7\"";
+  EXPECT_EQ(read("a:GpsLatitude=\"-50.51000123\" a:GpsLongitude=\"-0.25000123\"" + altitude)->altitude, 7);
+  const auto corrected = read("a:GpsLatitude=\"-50.51001\" a:GpsLongitude=\"-0.25\"" + altitude);
+  ASSERT_TRUE(corrected.has_value());
+  EXPECT_NEAR(corrected->latitude, -50.51, 1e-12) << "more than a metre off: corrected in EXIF";
+  EXPECT_EQ(corrected->altitude, -12.5);
   for (const char* xmp : {"a:GpsLatitude=\"0\" a:GpsLongitude=\"0\"", "a:GpsLatitude=\"50.1\"",
                           "a:GpsLatitude=\"99\" a:GpsLongitude=\"8\""}) {
     ASSERT_TRUE(read(xmp).has_value());

@@ -17,7 +17,9 @@ void linkOrCopy(const fs::path& source, const fs::path& target) {
   fs::path partial = target;
   partial += ".partial-" + std::to_string(::getpid());
   fs::remove(partial, status);
-  fs::create_hard_link(source, partial, status);
+  // Of a symbolic link, its file: a link to a symbolic link would be another one.
+  const fs::path file = fs::canonical(source, status);
+  if (!status) fs::create_hard_link(file, partial, status);
   if (status) fs::copy_file(source, partial, fs::copy_options::overwrite_existing, status);
   if (!status) fs::rename(partial, target, status);
   // POSIX leaves both names in place when a link is renamed over another link to the same file.

@@ -19,8 +19,7 @@
 namespace tessera {
 namespace {
 
-constexpr size_t kHeadBytes = size_t{1} << 20;  // tags and size stand in front of the picture and take fewer bytes
-constexpr double kFullFrameWidth = 36;          // millimetres
+constexpr double kFullFrameWidth = 36;  // millimetres
 
 struct Header {
   int width = 0, height = 0;  // 0: unreadable
@@ -41,11 +40,6 @@ std::string extensionInLowerCase(const fs::path& path) {
   return extension;
 }
 
-bool isPhotoName(const fs::path& path) {
-  const std::string extension = extensionInLowerCase(path);
-  return extension == ".jpg" || extension == ".jpeg" || extension == ".png";
-}
-
 // Photos in formats that only other programs read.
 bool isOtherFormat(const fs::path& path) {
   static const std::set<std::string> extensions{".arw", ".avif", ".cr2", ".cr3", ".dng", ".heic", ".heif", ".jp2",
@@ -56,13 +50,15 @@ bool isOtherFormat(const fs::path& path) {
 std::vector<fs::path> photoFiles(const fs::path& folder) {
   std::vector<fs::path> files;
   std::error_code status;
-  fs::recursive_directory_iterator at(folder, status), end;
+  fs::recursive_directory_iterator at(folder, fs::directory_options::follow_directory_symlink, status), end;
   fs::path last = folder;
+  std::set<fs::path> seen{fs::weakly_canonical(folder)};  // symbolic links can lead in circles
   for (; !status && at != end; at.increment(status)) {
     last = at->path();
     const bool isHidden = last.filename().string().starts_with(".");
     std::error_code ignored;
-    if (isHidden && at->is_directory(ignored)) at.disable_recursion_pending();
+    if (at->is_directory(ignored) && (isHidden || !seen.insert(fs::weakly_canonical(last, ignored)).second))
+      at.disable_recursion_pending();
     if (!isHidden && (isPhotoName(last) || isOtherFormat(last)) && at->is_regular_file(ignored)) files.push_back(last);
   }
   // A shorter list would be taken for other photos, and poses of all would be lost.
@@ -73,7 +69,7 @@ std::vector<fs::path> photoFiles(const fs::path& folder) {
 Header readHeader(const fs::path& file) {
   Header header;
   try {
-    const Bytes head = readFileStart(file, kHeadBytes);
+    const Bytes head = readPhotoHead(file);
     std::error_code status;
     header.fileBytes = fs::file_size(file, status);
     header.hash = contentHash(head);
@@ -136,6 +132,11 @@ void findFlights(PhotoList& list) {
 
 }  // namespace
 
+bool isPhotoName(const fs::path& path) {
+  const std::string extension = extensionInLowerCase(path);
+  return extension == ".jpg" || extension == ".jpeg" || extension == ".png";
+}
+
 void warnLeftOut(const std::vector<LeftOutPhoto>& photos) {
   std::map<std::string, std::vector<std::string>> byReason;
   for (const LeftOutPhoto& photo : photos) byReason[photo.reason].push_back(photo.name);
@@ -149,9 +150,9 @@ double focalLengthInPixels(const CameraTags& camera, int width, int height) {
     return focal > 0.3 * longSide && focal < 10 * longSide ? focal : 0;
   };
   if (camera.focalLength35 > 0) return plausible(camera.focalLength35 / kFullFrameWidth * longSide);
-  // The resolution is that of the full picture: of a reduced one, it would give too long a focal length. The field of
-  // view then is implausible.
-  return plausible(camera.focalLength * camera.pixelsPerMillimetre);
+  // The resolution is that of the picture as the camera wrote it: of a reduced one, it gives too long a focal length.
+  if (!(camera.recordedPixels > 0)) return 0;
+  return plausible(camera.focalLength * camera.pixelsPerMillimetre * longSide / camera.recordedPixels);
 }
 
 // Only such names can be stored in a capture.
@@ -209,7 +210,7 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
     const CameraTags& camera = header.tags.camera;
     CameraBody body{describe(camera, header.width, header.height), header.width, header.height,
                     focalLengthInPixels(camera, header.width, header.height)};
-    const std::string key = fmt::format("{}/{:.3f}", body.name, body.focalLength);
+    const std::string key = fmt::format("{}/{:.3f}/{:.3f}", body.name, body.focalLength, camera.focalLength);
     const auto [index, isNewBody] = bodies.emplace(key, static_cast<int>(list.bodies.size()));
     if (isNewBody) list.bodies.push_back(std::move(body));
     list.photos.push_back({name, makeSafe(name, safeNames), files[i], index->second, 0, header.tags});

@@ -11,7 +11,7 @@
 
 namespace tessera {
 
-// One lens on one camera, at one picture size: photos that share intrinsic parameters.
+// One lens on one camera, at one focal length and picture size: photos that share intrinsic parameters.
 struct CameraBody {
   std::string name;  // "DJI FC300S, 1600x900"
   int width = 0, height = 0;
@@ -45,6 +45,9 @@ inline constexpr double kPauseBetweenFlights = 300;  // seconds
 // other photos, panoramas, and infrared pictures beside visible ones. Hidden files and folders are ignored. Throws
 // Error if the folder cannot be read.
 PhotoList listPhotos(const fs::path& folder, ThreadPool& pool);
+
+// Whether this is the name of a picture that is read: JPEG or PNG.
+bool isPhotoName(const fs::path& path);
 
 // Warns of the photos, once for each reason.
 void warnLeftOut(const std::vector<LeftOutPhoto>& photos);

@@ -50,6 +50,36 @@ TEST_F(PhotoLists, LeaveOutWhatIsNoPhotoOrACopy) {
   EXPECT_EQ(list.leftOut[1].name + " " + list.leftOut[1].reason, "two.jpg the same file as another photo");
 }
 
+TEST_F(PhotoLists, FollowSymbolicLinks) {
+  write("one.jpg", 1);
+  const fs::path elsewhere = folder_ / ".elsewhere";
+  fs::create_directories(elsewhere / "more");
+  writeJpeg(elsewhere / "two.jpg", ImageU8(8, 6, 3, 2));
+  writeJpeg(elsewhere / "more/three.jpg", ImageU8(8, 6, 3, 3));
+  fs::create_symlink(elsewhere / "two.jpg", folder_ / "two.jpg");
+  fs::create_directory_symlink(elsewhere / "more", folder_ / "more");
+  fs::create_directory_symlink(folder_.path(), elsewhere / "more/back");
+  fs::create_symlink(elsewhere / "absent.jpg", folder_ / "absent.jpg");
+  const PhotoList list = this->list();
+  ASSERT_EQ(list.photos.size(), 3u);
+  EXPECT_EQ(list.photos[0].name, "more/three.jpg");
+  EXPECT_EQ(list.photos[2].name, "two.jpg");
+  EXPECT_TRUE(list.leftOut.empty());
+}
+
+// Phones store depth maps, and drones thermal pictures, in front of the picture.
+TEST_F(PhotoLists, ReadPhotosWithMoreThanAMegabyteOfTags) {
+  Bytes jpeg = encodeJpeg(ImageU8(8, 6, 3), 90);
+  Bytes segment(65002, std::byte{1});
+  for (const auto& [at, value] : {std::pair(0, 0xff), {1, 0xe2}, {2, 65000 >> 8}, {3, 65000 & 255}})
+    segment[static_cast<size_t>(at)] = static_cast<std::byte>(value);
+  for (int i = 0; i < 30; ++i) jpeg = withSegment(jpeg, segment);
+  writeFileAtomically(folder_ / "one.jpg", jpeg);
+  const PhotoList list = this->list();
+  ASSERT_EQ(list.photos.size(), 1u);
+  EXPECT_EQ(list.bodies[0].width, 8);
+}
+
 TEST_F(PhotoLists, LeaveOutNamesThatACaptureCannotHave) {
   write("one.jpg", 1);
   write(
@@ -91,8 +121,14 @@ TEST_F(PhotoLists, RefuseAFolderThatIsNotThere) {
 TEST(FocalLengths, FollowFromTheFieldOfViewOrTheSensor) {
   EXPECT_NEAR(focalLengthInPixels({.focalLength35 = 24}, 4000, 3000), 24.0 / 36 * 4000, 1e-9);
   EXPECT_NEAR(focalLengthInPixels({.focalLength35 = 24}, 3000, 4000), 24.0 / 36 * 4000, 1e-9);
-  EXPECT_NEAR(focalLengthInPixels({.focalLength = 8.8, .pixelsPerMillimetre = 416}, 5472, 3648), 8.8 * 416, 1e-9);
-  EXPECT_EQ(focalLengthInPixels({.focalLength = 8.8, .pixelsPerMillimetre = 41600}, 5472, 3648), 0) << "implausible";
+  CameraTags bySensor{.focalLength = 8.8, .pixelsPerMillimetre = 416, .recordedPixels = 5472};
+  EXPECT_NEAR(focalLengthInPixels(bySensor, 5472, 3648), 8.8 * 416, 1e-9);
+  EXPECT_NEAR(focalLengthInPixels(bySensor, 1368, 912), 8.8 * 416 / 4, 1e-9) << "reduced by a program that keeps tags";
+  EXPECT_NEAR(focalLengthInPixels(bySensor, 3648, 5472), 8.8 * 416, 1e-9);
+  bySensor.recordedPixels = 0;
+  EXPECT_EQ(focalLengthInPixels(bySensor, 5472, 3648), 0) << "it may be a reduced picture";
+  bySensor = {.focalLength = 8.8, .pixelsPerMillimetre = 41600, .recordedPixels = 5472};
+  EXPECT_EQ(focalLengthInPixels(bySensor, 5472, 3648), 0) << "implausible";
   EXPECT_EQ(focalLengthInPixels({.focalLength35 = 65535}, 4000, 3000), 0);
   EXPECT_EQ(focalLengthInPixels({}, 5472, 3648), 0);
 }

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/file_digest.h"
 #include "base/image_io.h"
 #include "base/log.h"
 #include "import/colmap_model.h"
@@ -52,9 +53,8 @@ std::string PhotoMasks::describe() const {
   fs::recursive_directory_iterator at(folder_, status), end;
   for (; !status && at != end; at.increment(status)) {
     std::error_code ignored;
-    if (!at->is_regular_file(ignored)) continue;
-    lines.push_back(fmt::format("{} {} {}\n", at->path().lexically_relative(folder_).generic_string(),
-                                at->file_size(ignored), at->last_write_time(ignored).time_since_epoch().count()));
+    if (isPhotoName(at->path()) && at->is_regular_file(ignored))
+      lines.push_back(at->path().lexically_relative(folder_).generic_string() + " " + fileDigest(at->path()) + "\n");
   }
   if (status) throw Error(folder_.string(), "", "cannot be listed: " + status.message(), "make it readable");
   std::sort(lines.begin(), lines.end());

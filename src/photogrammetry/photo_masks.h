@@ -15,7 +15,7 @@ class PhotoMasks {
   // `folder` holds the mask of a photo a/b.jpg as a/b.jpg.png, a/b.jpg or a/b.png. Throws Error if it is no folder.
   explicit PhotoMasks(fs::path folder);
 
-  // Names, sizes and times of all files in the folder, as text. Throws Error if it cannot be listed.
+  // Names and digests of all pictures in the folder, as text. Throws Error if it cannot be listed.
   std::string describe() const;
 
   // Set the masks of the photos that have one; of posed photos, in place of the source's own. A photo `images/a.jpg` of

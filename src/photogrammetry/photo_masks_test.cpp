@@ -47,14 +47,16 @@ TEST_F(PhotoMasksOf, AListHaveTheNamesOfItsPhotos) {
   EXPECT_EQ(list_.photos[2].mask, masks_ / "b/three.png");
 }
 
-TEST_F(PhotoMasksOf, AListAreDescribedByTheirFiles) {
+TEST_F(PhotoMasksOf, AListAreDescribedByTheirContents) {
   writeMask("a/one.png");
   const std::string before = PhotoMasks(masks_).describe();
+  writeFileAtomically(masks_ / "a/Thumbs.db", "of another program");
+  fs::last_write_time(masks_ / "a/one.png", fs::file_time_type());
   EXPECT_EQ(PhotoMasks(masks_).describe(), before);
   writeMask("b/three.png");
   EXPECT_NE(PhotoMasks(masks_).describe(), before);
   fs::remove(masks_ / "b/three.png");
-  fs::last_write_time(masks_ / "a/one.png", fs::file_time_type());
+  writePng(masks_ / "a/one.png", ImageU8(16, 12, 1, 7));
   EXPECT_NE(PhotoMasks(masks_).describe(), before);
 }
 

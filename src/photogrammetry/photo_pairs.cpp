@@ -18,8 +18,11 @@ constexpr double kDegree = std::numbers::pi / 180;
 constexpr int kSamples = 7;                                                     // of a footprint, along each side
 constexpr double kUnknownFocal = 0.8;                                           // of the longer side, as in most drones
 constexpr double kLeastHeight = 5, kUnknownHeight = 80, kGreatestHeight = 500;  // metres
-// Of the distance of neighbouring photos, the side of the footprint of a survey with an overlap of 80 %.
-constexpr double kSideOfDistance = 5;
+// Of the distance of neighbouring photos, the side of the footprint of a survey with an overlap of 80 %, and with the
+// least that surveys have, 60 %.
+constexpr double kSideOfDistance = 5, kLeastSideOfDistance = 2.5;
+// Photos at exactly one place beyond which their receiver has not moved with them.
+constexpr int kMaxAtOnePlace = 4;
 // Footprints end where rays are so near the horizon that they go farther than this many heights.
 constexpr double kFarthestHeights = 6;
 
@@ -82,16 +85,30 @@ Footprint makeFootprint(const PhotoList& list, int photo, const Vec3d& eye) {
   return print;
 }
 
-// Returns the height above the ground of photos of which no tag states it.
-double unknownHeight(const PhotoList& list, const std::vector<int>& photos, const std::vector<Vec2d>& places) {
-  std::vector<double> heights, distances, slopes;
+// Whether each photo's GPS tells which others show the same: not if it is the place of a whole album, or of a receiver
+// that has lost its satellites, unless the gimbal or the barometer tells more.
+std::vector<bool> tellPlaces(const PhotoList& list) {
+  std::map<std::pair<double, double>, int> counts;
+  for (const ListedPhoto& photo : list.photos)
+    if (photo.tags.gps) ++counts[{photo.tags.gps->latitude, photo.tags.gps->longitude}];
+  std::vector<bool> tell;
+  for (const ListedPhoto& photo : list.photos) {
+    const auto& gps = photo.tags.gps;
+    tell.push_back(gps && (photo.tags.gimbal || gps->relativeAltitude != 0 ||
+                           counts[{gps->latitude, gps->longitude}] <= kMaxAtOnePlace));
+  }
+  return tell;
+}
+
+// Returns the height above the ground at which a footprint's shorter side is so many times the distance of neighbouring
+// photos; nothing if they all stand at one place.
+std::optional<double> heightFromDistances(const PhotoList& list, const std::vector<int>& photos,
+                                          const std::vector<Vec2d>& places, double sideOfDistance) {
+  std::vector<double> distances, slopes;
   for (const int photo : photos) {
-    const ListedPhoto& p = list.photos[static_cast<size_t>(photo)];
-    if (p.tags.gps->relativeAltitude > kLeastHeight) heights.push_back(p.tags.gps->relativeAltitude);
-    const CameraBody& body = list.bodies[static_cast<size_t>(p.body)];
+    const CameraBody& body = list.bodies[static_cast<size_t>(list.photos[static_cast<size_t>(photo)].body)];
     slopes.push_back(std::min(body.width, body.height) / focalLength(body));
   }
-  if (!heights.empty()) return upperMedian(heights);
   for (const Vec2d& place : places) {
     double nearest = std::numeric_limits<double>::infinity();
     for (const Vec2d& other : places) {
@@ -100,33 +117,34 @@ double unknownHeight(const PhotoList& list, const std::vector<int>& photos, cons
     }
     if (std::isfinite(nearest)) distances.push_back(nearest);
   }
-  if (distances.empty()) return kUnknownHeight;
-  return std::clamp(kSideOfDistance * upperMedian(distances) / upperMedian(slopes), kLeastHeight, kGreatestHeight);
+  if (distances.empty()) return std::nullopt;
+  return std::clamp(sideOfDistance * upperMedian(distances) / upperMedian(slopes), kLeastHeight, kGreatestHeight);
 }
 
-std::vector<Footprint> footprints(const PhotoList& list) {
-  GeoFrame frame;
-  int fixes = 0;
-  for (const ListedPhoto& photo : list.photos) fixes += photo.tags.gps ? 1 : 0;
-  for (const ListedPhoto& photo : list.photos) {
-    if (!photo.tags.gps) continue;
-    frame.latitude += photo.tags.gps->latitude / fixes;
-    frame.longitude += photo.tags.gps->longitude / fixes;
-  }
+// Of the photos whose GPS tells their places.
+std::vector<Footprint> footprints(const PhotoList& list, const std::vector<bool>& tellPlace) {
+  std::vector<GpsFix> fixes;
   std::vector<int> photos;
-  std::vector<Vec2d> places;
+  std::vector<double> heights;  // those above take-off that are stated
   for (size_t i = 0; i < list.photos.size(); ++i) {
-    const auto& gps = list.photos[i].tags.gps;
-    if (!gps) continue;
+    if (!tellPlace[i]) continue;
     photos.push_back(static_cast<int>(i));
-    places.push_back(enuFromGps(frame, gps->latitude, gps->longitude, 0).head<2>());
+    fixes.push_back(*list.photos[i].tags.gps);
+    if (fixes.back().relativeAltitude > kLeastHeight) heights.push_back(fixes.back().relativeAltitude);
   }
-  const double unknown = unknownHeight(list, photos, places);
+  const GeoFrame frame = frameAround(fixes);
+  std::vector<Vec2d> places;
+  for (const GpsFix& gps : fixes) places.push_back(enuFromGps(frame, gps.latitude, gps.longitude, 0).head<2>());
+  // A drone that took off from a hill says that it is lower than it is above the ground, and neighbouring lines would
+  // not seem to overlap.
+  const double least = heightFromDistances(list, photos, places, kLeastSideOfDistance).value_or(kLeastHeight);
+  const double unknown = heights.empty()
+                             ? heightFromDistances(list, photos, places, kSideOfDistance).value_or(kUnknownHeight)
+                             : upperMedian(heights);
   std::vector<Footprint> prints;
   for (size_t k = 0; k < photos.size(); ++k) {
-    const double height = list.photos[static_cast<size_t>(photos[k])].tags.gps->relativeAltitude;
-    prints.push_back(
-        makeFootprint(list, photos[k], Vec3d(places[k].x(), places[k].y(), height > kLeastHeight ? height : unknown)));
+    const double stated = fixes[k].relativeAltitude > kLeastHeight ? fixes[k].relativeAltitude : unknown;
+    prints.push_back(makeFootprint(list, photos[k], Vec3d(places[k].x(), places[k].y(), std::max(stated, least))));
   }
   return prints;
 }
@@ -145,7 +163,8 @@ PhotoPair inOrder(int a, int b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
-void pairInSequence(const PhotoList& list, const PairOptions& options, std::set<PhotoPair>& pairs) {
+void pairInSequence(const PhotoList& list, const std::vector<bool>& tellPlace, const PairOptions& options,
+                    std::set<PhotoPair>& pairs) {
   std::map<int, std::vector<int>> flights;
   for (size_t i = 0; i < list.photos.size(); ++i) flights[list.photos[i].flight].push_back(static_cast<int>(i));
   for (auto& [flight, photos] : flights) {
@@ -155,11 +174,10 @@ void pairInSequence(const PhotoList& list, const PairOptions& options, std::set<
     });
     for (size_t i = 0; i < photos.size(); ++i) {
       for (size_t k = i + 1; k < photos.size(); ++k) {
-        const bool haveGps = list.photos[static_cast<size_t>(photos[i])].tags.gps.has_value() &&
-                             list.photos[static_cast<size_t>(photos[k])].tags.gps.has_value();
+        const bool tell = tellPlace[static_cast<size_t>(photos[i])] && tellPlace[static_cast<size_t>(photos[k])];
         const auto distance = static_cast<int>(k - i);
         if (distance > std::max(options.neighbours, options.sequence)) break;
-        if (distance <= (haveGps ? options.neighbours : options.sequence)) pairs.insert(inOrder(photos[i], photos[k]));
+        if (distance <= (tell ? options.neighbours : options.sequence)) pairs.insert(inOrder(photos[i], photos[k]));
       }
     }
   }
@@ -170,8 +188,9 @@ struct Candidate {
   int a, b;  // indices into the footprints
 };
 
-void pairByFootprint(const PhotoList& list, const PairOptions& options, std::set<PhotoPair>& pairs) {
-  const std::vector<Footprint> prints = footprints(list);
+void pairByFootprint(const PhotoList& list, const std::vector<bool>& tellPlace, const PairOptions& options,
+                     std::set<PhotoPair>& pairs) {
+  const std::vector<Footprint> prints = footprints(list, tellPlace);
   std::vector<std::vector<Candidate>> candidates(prints.size());
   std::vector<Candidate> all;
   for (size_t a = 0; a < prints.size(); ++a) {
@@ -187,7 +206,7 @@ void pairByFootprint(const PhotoList& list, const PairOptions& options, std::set
     }
   }
   const auto byOverlap = [](const Candidate& x, const Candidate& y) {
-    return std::tuple(-x.overlap, x.a, x.b) < std::tuple(-y.overlap, y.a, y.b);
+    return std::tuple(-x.overlap, x.b - x.a, x.a) < std::tuple(-y.overlap, y.b - y.a, y.a);
   };
   const auto photo = [&](int print) { return prints[static_cast<size_t>(print)].photo; };
   for (size_t i = 0; i < prints.size(); ++i) {
@@ -221,14 +240,15 @@ void pairByFootprint(const PhotoList& list, const PairOptions& options, std::set
   }
 }
 
-void pairLookAlikes(const PhotoList& list, const LookAlikes& lookAlikes, int partners, std::set<PhotoPair>& pairs) {
+void pairLookAlikes(const std::vector<bool>& tellPlace, const LookAlikes& lookAlikes, int partners,
+                    std::set<PhotoPair>& pairs) {
   for (size_t i = 0; i < lookAlikes.size(); ++i) {
     int count = 0;
     for (const int other : lookAlikes[i]) {
       const auto o = static_cast<size_t>(other);
       if (count == partners) break;
-      // Their places tell more of photos that both have GPS.
-      if (other == static_cast<int>(i) || (list.photos[i].tags.gps && list.photos[o].tags.gps)) continue;
+      // Their places tell more, if they are known of both.
+      if (other == static_cast<int>(i) || (tellPlace[i] && tellPlace[o])) continue;
       ++count;
       pairs.insert(inOrder(static_cast<int>(i), other));
     }
@@ -238,8 +258,9 @@ void pairLookAlikes(const PhotoList& list, const LookAlikes& lookAlikes, int par
 }  // namespace
 
 bool needsLookAlikes(const PhotoList& list, const PairOptions& options) {
-  return static_cast<int>(list.photos.size()) > options.all &&
-         std::any_of(list.photos.begin(), list.photos.end(), [](const ListedPhoto& photo) { return !photo.tags.gps; });
+  if (static_cast<int>(list.photos.size()) <= options.all) return false;
+  const std::vector<bool> tellPlace = tellPlaces(list);
+  return std::find(tellPlace.begin(), tellPlace.end(), false) != tellPlace.end();
 }
 
 std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& lookAlikes, const PairOptions& options) {
@@ -250,9 +271,10 @@ std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& look
       for (int b = a + 1; b < count; ++b) pairs.emplace(a, b);
     return {pairs.begin(), pairs.end()};
   }
-  pairInSequence(list, options, pairs);
-  pairByFootprint(list, options, pairs);
-  pairLookAlikes(list, lookAlikes, options.lookAlikes, pairs);
+  const std::vector<bool> tellPlace = tellPlaces(list);
+  pairInSequence(list, tellPlace, options, pairs);
+  pairByFootprint(list, tellPlace, options, pairs);
+  pairLookAlikes(tellPlace, lookAlikes, options.lookAlikes, pairs);
   return {pairs.begin(), pairs.end()};
 }
 

@@ -32,8 +32,9 @@ bool needsLookAlikes(const PhotoList& list, const PairOptions& options = {});
 
 // Returns the pairs, sorted. With GPS, footprints on the ground decide, for photos without gimbal angles as if they
 // looked straight down; photos with GPS whose footprints overlap are connected. Heights above the ground that are not
-// known are those of the other photos, or follow from the distances of the photos. Photos without GPS are paired with
-// those that look alike; `lookAlikes` may be empty.
+// known are those of the other photos, or follow from the distances of the photos; those that are known count for at
+// least what a survey with little overlap has. Photos without GPS, and those of which many have the same place and
+// nothing else tells them apart, are paired with those that look alike; `lookAlikes` may be empty.
 std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& lookAlikes,
                                    const PairOptions& options = {});
 

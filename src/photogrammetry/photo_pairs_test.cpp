@@ -142,6 +142,30 @@ TEST(PhotoPairs, FollowFromDistancesIfHeightsAreUnknown) {
   }
 }
 
+// A drone that took off from a hill says that it is 8 m high where it is 60 m above the ground.
+TEST(PhotoPairs, ConnectLinesOfADroneThatTookOffAboveTheGround) {
+  PhotoList list = survey(12, 12, 15);
+  for (ListedPhoto& photo : list.photos) photo.tags.gps->relativeAltitude = 8;
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
+  EXPECT_EQ(groups(list, pairs), 1);
+  EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(), PhotoPair(6, 17)));
+}
+
+// Photos of an album that are all tagged with one place.
+TEST(PhotoPairs, OfPhotosWithOnePlaceAreThoseOfPhotosWithoutGps) {
+  PhotoList album = survey(6, 10, 15);
+  for (ListedPhoto& photo : album.photos) {
+    photo.tags.gps = GpsFix{46.5, 6.5, 400, 0};
+    photo.tags.gimbal.reset();
+  }
+  PhotoList bare = album;
+  for (ListedPhoto& photo : bare.photos) photo.tags.gps.reset();
+  EXPECT_TRUE(needsLookAlikes(album));
+  LookAlikes lookAlikes(60);
+  lookAlikes[0] = {30, 40};
+  EXPECT_EQ(choosePairs(album, lookAlikes), choosePairs(bare, lookAlikes));
+}
+
 // Drone photos with GPS among more photos without.
 TEST(PhotoPairs, FollowFromGpsForThosePhotosThatHaveIt) {
   PhotoList list = survey(8, 12, 15);
