@@ -46,12 +46,16 @@ std::optional<ModelManifest> ModelFolder::manifest() const {
     manifest.method = parsed.at("method").get<std::string>();
     manifest.step = parsed.at("step").get<int64_t>();
     manifest.plannedSteps = parsed.at("planned_steps").get<int64_t>();
+    manifest.seconds = parsed.value("seconds", 0.0);
+    manifest.savingSeconds = parsed.value("saving_seconds", 0.0);
     for (const json& file : parsed.at("files")) manifest.files.push_back(file.get<std::string>());
   } catch (const json::exception& error) {
     throw Error(path.string(), "", error.what(), "restore the file or train again");
   }
-  if (manifest.files.empty() || manifest.step < 0 || manifest.plannedSteps < 0) {
-    throw Error(path.string(), "", "names no checkpoint, or a step below zero", "restore the file or train again");
+  const bool areTimes = manifest.savingSeconds >= 0 && manifest.seconds >= manifest.savingSeconds;
+  if (manifest.files.empty() || manifest.step < 0 || manifest.plannedSteps < 0 || !areTimes) {
+    throw Error(path.string(), "", "names no checkpoint, or a step or a time below zero",
+                "restore the file or train again");
   }
   for (const std::string& file : manifest.files) {
     const std::optional<fs::path> inside = resolveInside(root_, file);
@@ -88,10 +92,15 @@ void removeOld(const fs::path& folder, int64_t step, int keep) {
 }  // namespace
 
 void ModelFolder::writeManifest(const ModelManifest& manifest) const {
-  const json text = {{"method", manifest.method},
-                     {"step", manifest.step},
-                     {"planned_steps", manifest.plannedSteps},
-                     {"files", manifest.files}};
+  json text = {{"method", manifest.method},
+               {"step", manifest.step},
+               {"planned_steps", manifest.plannedSteps},
+               {"files", manifest.files}};
+  // Only then: the same steps have the same manifest, however long they took.
+  if (manifest.plannedSteps == 0 && manifest.seconds > 0) {
+    text["seconds"] = manifest.seconds;
+    text["saving_seconds"] = manifest.savingSeconds;
+  }
   writeFileAtomically(root_ / "manifest.json", text.dump(2) + "\n", true);
 }
 

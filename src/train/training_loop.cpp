@@ -139,7 +139,9 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
   TrainingResult result;
   double savedAt = 0, lastSaving = 0, saving = 0;  // seconds
   double totalSamples = 0, totalRays = 0;
-  const int64_t firstStep = state.step;
+  // Of the minutes, what an earlier process has taken that was interrupted before the number of steps was known.
+  const double secondsBefore = state.plannedSteps == 0 ? state.seconds : 0;
+  const double savingBefore = state.plannedSteps == 0 ? state.savingSeconds : 0;
   std::optional<Progress> progress;
   if (options.progress) progress.emplace("training", state.plannedSteps, "steps");
 
@@ -153,6 +155,8 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
   const auto save = [&] {
     const double begun = seconds();
     if (trainable.firstNonFinitePart()) throw notANumber("a parameter");
+    state.seconds = secondsBefore + begun;
+    state.savingSeconds = savingBefore + saving;
     folder.commit(state, trainable.parts(), [&](uint32_t part) {
       return trainable.isAsSaved(part) ? std::nullopt : std::optional<Bytes>(trainable.save(part));
     });
@@ -173,9 +177,8 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
     const double now = seconds();
     if (state.plannedSteps == 0) {
       const double savingShare = lastSaving > 0 ? lastSaving / (lastSaving + untilSaving()) : 0;
-      state.plannedSteps = budget.observe(state.step - firstStep, now, saving, savingShare);
+      state.plannedSteps = budget.observe(state.step, secondsBefore + now, savingBefore + saving, savingShare);
       if (state.plannedSteps != 0) {
-        state.plannedSteps += firstStep;
         planMadeAt = state.step;
         folder.writePlan({state.plannedSteps, planMadeAt});
         if (progress) progress->setTotal(state.plannedSteps);

@@ -317,6 +317,31 @@ TEST_F(TrainingLoop, KeepsTheStepsOfItsMinutesWhenResumed) {
   EXPECT_EQ(second.steps.back() + 1, stopped.plannedSteps);
 }
 
+// On machines that are taken away again and again, before a quarter of the minutes is over.
+TEST_F(TrainingLoop, CountsTheMinutesOfInterruptedAttempts) {
+  using Clock = std::chrono::steady_clock;
+  TrainingLoopOptions some = options(0, true);
+  some.minutes = 1.0 / 60;
+  TrainingResult result;
+  int attempts = 0;
+  double seconds = 0;
+  while (!result.finished && attempts < 100) {
+    FakeTrainableModel trainable;
+    trainable.pace = std::chrono::microseconds(1000);
+    const auto begun = Clock::now();
+    some.stopRequested = [&] { return Clock::now() - begun > std::chrono::milliseconds(100); };
+    result = runTraining(trainable, folder_, some);
+    seconds += result.seconds;
+    ++attempts;
+    const ModelManifest manifest = folder_.manifest().value_or(ModelManifest());
+    EXPECT_EQ(manifest.plannedSteps == 0, manifest.seconds > 0) << "a manifest of known steps has no times";
+  }
+  EXPECT_TRUE(result.finished);
+  EXPECT_GT(attempts, 3);
+  EXPECT_LT(seconds, 4);
+  EXPECT_EQ(folder_.readPlan()->steps, result.step);
+}
+
 TEST_F(TrainingLoop, UsesThePlanOfARunThatWasKilledBeforeItsFirstCheckpoint) {
   FakeTrainableModel first;
   first.pace = std::chrono::microseconds(200);
