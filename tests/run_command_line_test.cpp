@@ -71,6 +71,21 @@ TEST_F(RunCommandLine, NamesWhatToInstallAndWhichStagesThereAre) {
   EXPECT_TRUE(contains(said.err, "apt-get install colmap")) << said.err;
 }
 
+TEST_F(RunCommandLine, KeepsTheFlagsOfTheRunBefore) {
+  for (int i = 0; i < 3; ++i)
+    writeJpeg(photos_ / (std::to_string(i) + ".jpg"), ImageU8(8, 8, 3, static_cast<uint8_t>(i)));
+  EXPECT_EQ(run({"--until", "inspect", "--method", "volume", "--minutes", "7"}).exitCode, 0);
+  Said said = run({"--until", "inspect"});
+  EXPECT_TRUE(contains(said.err, "as before in " + (folder_ / "out").string() + ": --method volume --minutes 7"))
+      << said.err;
+  said = run({"--until", "inspect", "--method", "hash"});
+  EXPECT_TRUE(contains(said.err, ": --minutes 7")) << said.err;
+  writeFileAtomically(folder_ / "out/run.json", R"({"flags": {"--method": "field"}})");
+  said = run({"--until", "inspect"});
+  EXPECT_EQ(said.exitCode, 1);
+  EXPECT_TRUE(contains(said.err, "run.json: flags: there is no method field; give --method")) << said.err;
+}
+
 TEST_F(RunCommandLine, TakesPhotosFromAVideo) {
   if (!isInPath("ffmpeg")) GTEST_SKIP() << "ffmpeg is not installed: videos are not tested";
   for (int i = 0; i < 12; ++i) {

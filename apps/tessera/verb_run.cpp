@@ -1,10 +1,15 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <set>
+
 #include "apps/tessera/command_line.h"
 #include "apps/tessera/serving.h"
 #include "apps/tessera/verbs.h"
+#include "base/error.h"
 #include "photogrammetry/frame_choice.h"
 #include "pipeline/photo_run.h"
+#include "pipeline/run_request.h"
 #include "representations/methods.h"
 
 namespace tessera {
@@ -31,6 +36,14 @@ TrainingCosts typicalCosts(const std::string& method, bool onGpu) {
           .modelBytes = costs.modelBytes};
 }
 
+// The flags of the command line, whether their values are the defaults or not.
+std::set<std::string> givenFlags(const CLI::App& verb) {
+  std::set<std::string> flags;
+  for (const CLI::Option* option : verb.get_options())
+    if (option->count() > 0) flags.insert(option->get_name());
+  return flags;
+}
+
 }  // namespace
 
 void addRunVerb(CLI::App& app) {
@@ -39,7 +52,8 @@ void addRunVerb(CLI::App& app) {
   CLI::App* verb =
       app.add_subcommand("run", "a folder of photos, or a video, to a scene: poses, training, baking, evaluation");
   verb->footer(
-      "Run again with the same folders after an interruption: what is finished is kept.\n\n"
+      "Run again with the same folders after an interruption: what is finished is kept, and flags that are not given\n"
+      "are those of the run before.\n\n"
       "Examples:\n  tessera run photos/ place --minutes 10\n  tessera run flight.mp4 place --serve 8080");
   verb->add_option("photos", options->photos,
                    "folder of photos (JPEG, PNG), a video, or photos with poses as `import` reads them")
@@ -94,11 +108,17 @@ void addRunVerb(CLI::App& app) {
   verb->add_option("--viewer", serving->viewer, "with --serve: folder of the viewer's files")
       ->capture_default_str()
       ->needs(served);
-  verb->callback([options, device, serving, served] {
+  verb->callback([verb, options, device, serving, served] {
     if (served->count() > 0) requireViewer(serving->viewer);
-    if (device->kind != options->device) makeDevice(*device);  // throws if there is none, before hours are spent
     options->device = device->kind;
     options->threads = device->threads;
+    adoptEarlierFlags(*options, givenFlags(*verb));
+    const auto baked = bakedMethods();
+    if (std::find(baked.begin(), baked.end(), options->method) == baked.end())
+      throw Error((options->out / "run.json").string(), "flags", "there is no method " + options->method,
+                  "give --method");
+    device->kind = options->device;
+    if (device->kind != "cpu") makeDevice(*device);  // throws if there is none, before hours are spent
     options->program = fs::read_symlink("/proc/self/exe").string();
     options->costs = typicalCosts(options->method, parseVulkanDevice(options->device).has_value());
     options->interrupted = interrupted;

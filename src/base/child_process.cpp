@@ -17,6 +17,7 @@
 #include <thread>
 
 #include "base/check.h"
+#include "base/error.h"
 
 namespace tessera {
 namespace {
@@ -41,7 +42,12 @@ std::string ChildProcess::start(std::vector<std::string> arguments, const ChildO
   if (options.log.empty()) {
     messages_.reset(::memfd_create("messages", MFD_CLOEXEC));
   } else {
+    std::error_code ignored;
+    fs::create_directories(options.log.parent_path(), ignored);
     messages_.reset(::open(options.log.c_str(), O_RDWR | O_CREAT | O_APPEND | O_CLOEXEC, 0666));
+    if (messages_.get() < 0)
+      throw Error(options.log.string(), "", std::string("cannot be written: ") + std::strerror(errno),
+                  "check free space and permissions");
   }
   if (messages_.get() < 0) return std::strerror(errno);
   before_ = std::max<off_t>(::lseek(messages_.get(), 0, SEEK_END), 0);

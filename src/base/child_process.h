@@ -30,9 +30,11 @@ class Descriptor {
 };
 
 struct ChildOptions {
-  int input = -1;   // a descriptor that it reads as its standard input; -1: it has none
-  fs::path log;     // a file to which its standard output and error output are appended; empty: they are kept in memory
-  int output = -1;  // a descriptor that its standard output is written to instead (output_pipe.h)
+  int input = -1;  // a descriptor that it reads as its standard input; -1: it has none
+  // A file to which its standard output and error output are appended, in a folder that is created if it is missing;
+  // empty: they are kept in memory.
+  fs::path log;
+  int output = -1;           // a descriptor that its standard output is written to instead (output_pipe.h)
   bool hasOwnGroup = false;  // Ctrl-C on a terminal does not reach it; `interrupt` does
 };
 
@@ -44,6 +46,7 @@ class ChildProcess {
   ChildProcess& operator=(const ChildProcess&) = delete;
 
   // Starts the program arguments[0], which is looked up in PATH. Returns an empty text, or why it cannot be started.
+  // Throws Error naming the log if it cannot be written.
   std::string start(std::vector<std::string> arguments, const ChildOptions& options = {});
   bool isRunning() const { return process_ > 0; }  // started, and wait was not called
   // Waits for its end, at most for so long. Returns whether it has ended; then `wait` says how.

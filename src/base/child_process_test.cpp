@@ -7,6 +7,7 @@
 
 #include <fstream>
 
+#include "base/error.h"
 #include "base/testing/temporary_folder.h"
 
 namespace tessera {
@@ -56,6 +57,13 @@ TEST(ChildProcess, AppendsItsOutputToALog) {
     EXPECT_EQ(process.lastWords(4), word);
   }
   EXPECT_EQ(readTextFile(folder.path() / "log"), "one\ntwo\n");
+  fs::create_directories(folder.path() / "a folder");
+  try {
+    ChildProcess().start({"echo"}, {.log = folder.path() / "a folder"});
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("a folder: cannot be written: "), std::string::npos) << error.what();
+  }
 }
 
 TEST(ChildProcess, TellsItsPeakMemory) {

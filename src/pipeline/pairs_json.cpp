@@ -13,7 +13,7 @@ using Json = nlohmann::ordered_json;
 }  // namespace
 
 void writePairs(const fs::path& file, const ChosenPairs& chosen) {
-  const Json json = {{"pairs", chosen.pairs}, {"look_alikes", chosen.lookAlikes}};
+  const Json json = {{"photos", chosen.photos}, {"pairs", chosen.pairs}, {"look_alikes", chosen.lookAlikes}};
   writeFileAtomically(file, json.dump());
 }
 
@@ -32,6 +32,7 @@ ChosenPairs readPairs(const fs::path& file, size_t photos) {
   };
   if (!hasLists("pairs") || !hasLists("look_alikes")) throw damaged;
   ChosenPairs chosen;
+  if (json.contains("photos") && json["photos"].is_string()) chosen.photos = json["photos"].get<std::string>();
   for (const Json& pair : json["pairs"]) {
     if (pair.size() != 2 || pair[0] >= pair[1]) throw damaged;
     chosen.pairs.emplace_back(pair[0].get<int>(), pair[1].get<int>());

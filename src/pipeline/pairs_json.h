@@ -9,6 +9,7 @@
 namespace tessera {
 
 struct ChosenPairs {
+  std::string photos;  // a digest of the photos that they are pairs of
   std::vector<PhotoPair> pairs;
   LookAlikes lookAlikes;
 };

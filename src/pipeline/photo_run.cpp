@@ -8,9 +8,11 @@
 
 #include "base/child_process.h"
 #include "base/error.h"
+#include "base/file_digest.h"
 #include "base/log.h"
 #include "base/order_statistics.h"
 #include "base/progress.h"
+#include "import/capture_reader.h"
 #include "import/georeference.h"
 #include "import/importer.h"
 #include "photogrammetry/photo_list.h"
@@ -28,6 +30,7 @@
 #include "pipeline/run_estimator.h"
 #include "pipeline/run_report.h"
 #include "pipeline/run_request.h"
+#include "pipeline/training_progress.h"
 
 namespace tessera {
 namespace {
@@ -56,7 +59,7 @@ class PhotoRun {
     const std::string training =
         options_.steps > 0 ? fmt::format("--steps {}", options_.steps) : fmt::format("--minutes {}", options_.minutes);
     std::vector<Stage> stages = {
-        {.name = "inspect", .settings = frames_ ? "" : describePhotos(), .run = [this](bool) { return inspect(); }},
+        {.name = "inspect", .settings = frames_ ? "" : photosDigest_, .run = [this](bool) { return inspect(); }},
         {.name = "features",
          .settings = masks_ ? textDigest(masks_->describe()) : "",
          .isComplete = has("poses/database.db"),
@@ -96,9 +99,10 @@ class PhotoRun {
          .isComplete = has("poses/georeference.json"),
          .run = [this](bool) { return georeferencing(); }},
         {.name = "capture",
-         .settings =
-             (frames_ && options_.downscale == 0 ? options_.method + " " + training : std::to_string(downscale())) +
-             " " + describeHoldOut() + (posed_ ? " " + posed_->digest() : ""),
+         .settings = (frames_ && options_.downscale == 0
+                          ? fmt::format("{} {} {:.0f}", options_.method, training, options_.costs.raysPerSecond)
+                          : std::to_string(downscale())) +
+                     " " + describeHoldOut() + (posed_ ? " " + posed_->digest() : ""),
          .isComplete =
              [this] {
                return has("capture/transforms.json")() &&
@@ -110,7 +114,7 @@ class PhotoRun {
          .settings = fmt::format("--method {} {}", options_.method, training),
          .isComplete = has("model/manifest.json"),
          .discard = [this] { setModelAside(); },
-         .needs = [this](bool) { return trainingNeeds().train; },
+         .needs = [this](bool resumes) { return withoutDone(trainingNeeds().train, resumes ? shareTrained() : 0); },
          .run = [this](bool) { return train(); }},
         {.name = "bake",
          .settings = "",
@@ -159,8 +163,9 @@ class PhotoRun {
                   fmt::format("holds {} photos that can be used; poses need three", list_.photos.size()),
                   "name a folder of JPEG or PNG photos, or a video");
     }
+    photosDigest_ = describePhotos();
     if (masks_) masks_->addTo(list_);
-    estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, describePhotos());
+    estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, photosDigest_);
   }
 
   fs::path out(const char* name) const { return options_.out / name; }
@@ -184,13 +189,10 @@ class PhotoRun {
     };
   }
 
+  // By their contents: a copy has other times.
   std::string describePhotos() const {
     std::string text;
-    for (const ListedPhoto& photo : list_.photos) {
-      std::error_code status;
-      text += fmt::format("{} {} {}\n", photo.name, fs::file_size(photo.file, status),
-                          fs::last_write_time(photo.file, status).time_since_epoch().count());
-    }
+    for (const ListedPhoto& photo : list_.photos) text += fmt::format("{} {}\n", photo.name, fileDigest(photo.file));
     return textDigest(text);
   }
 
@@ -200,12 +202,19 @@ class PhotoRun {
     return textDigest(text);
   }
 
-  bool hasHoldOut() const { return posed_ ? posed_->holdsOut() : options_.holdout != "none"; }
-  // Of a list, also what it contains.
+  // The import may drop the photos that are to be held out: the capture decides, if it is there.
+  bool hasHoldOut() const {
+    try {
+      if (has("capture/transforms.json")()) return !readCapture(out("capture")).photosIn(Split::test).empty();
+    } catch (const Error&) {  // damaged: it will be written again, or evaluation says so
+    }
+    return posed_ ? posed_->holdsOut() : options_.holdout != "none";
+  }
+  // Of a list, what it contains.
   std::string describeHoldOut() const {
     constexpr std::string_view kList = "list:";
     const std::string& holdout = options_.holdout;
-    return holdout + (holdout.starts_with(kList) ? " " + textDigest(readTextFile(holdout.substr(kList.size()))) : "");
+    return holdout.starts_with(kList) ? "list " + textDigest(readTextFile(holdout.substr(kList.size()))) : holdout;
   }
 
   StageOutcome inspect() {
@@ -234,7 +243,7 @@ class PhotoRun {
         warn("photos without GPS are only compared with those before and after them: {}", error.what());
       }
     }
-    const ChosenPairs chosen{choosePairs(list_, lookAlikes), lookAlikes};
+    const ChosenPairs chosen{photosDigest_, choosePairs(list_, lookAlikes), lookAlikes};
     writePairs(pairsFile(), chosen);
     estimator_->setPairs(chosen.pairs.size());
     return {matches_->takePeakBytes(),
@@ -346,8 +355,6 @@ class PhotoRun {
 
   // Runs a verb of this program; its messages are in logs/VERB.log, and the last one is shown meanwhile.
   StageOutcome runVerb(const std::string& verb, std::vector<std::string> arguments) {
-    std::error_code status;
-    fs::create_directories(out("logs"), status);
     const fs::path log = options_.out / "logs" / (verb + ".log");
     arguments.insert(arguments.begin(), {options_.program, verb, "--device", options_.device});
     if (options_.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(options_.threads)});
@@ -374,6 +381,13 @@ class PhotoRun {
       throw Error("tessera " + verb, "", end + ": " + lastLine(), "see " + log.string() + "; run again to go on");
     }
     return {process.peakBytes(), lastLine()};
+  }
+
+  // How much of the training the model has behind it.
+  double shareTrained() const {
+    const TrainingProgress done = readTrainingProgress(out("model"));
+    if (done.plannedSteps > 0) return static_cast<double>(done.step) / static_cast<double>(done.plannedSteps);
+    return options_.steps > 0 ? 0 : done.seconds / (60 * options_.minutes);
   }
 
   // A model that was trained on something else or in another way is kept beside the new one.
@@ -438,6 +452,7 @@ class PhotoRun {
   std::optional<PhotoMasks> masks_;    // of photos without poses
   std::optional<VideoPhotos> frames_;  // of a video
   PhotoList list_;                     // of a video: empty until its frames are there
+  std::string photosDigest_;           // of its photos
   std::unique_ptr<PhotoMatches> matches_;
   std::unique_ptr<PhotoModels> models_;
   std::unique_ptr<RunEstimator> estimator_;

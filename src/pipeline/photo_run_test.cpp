@@ -153,6 +153,47 @@ TEST_F(PhotoRuns, CanBeInterruptedWhilePhotosAreImported) {
   EXPECT_TRUE(contains(run(), "9 photos, 2 held out"));
 }
 
+TEST_F(PhotoRuns, OfACopyOfTheirPhotosAreNotRepeated) {
+  writePosed(9);
+  run();
+  options_.photos = folder_ / "copy";
+  fs::copy(folder_ / "photos", options_.photos, fs::copy_options::recursive);
+  for (int i = 0; i < 9; ++i)
+    fs::last_write_time(options_.photos / ("images/a" + std::to_string(i) + ".png"), fs::file_time_type::clock::now());
+  EXPECT_TRUE(contains(run(), "capture    finished before"));
+  const fs::path changed = options_.photos / "images/a4.png";
+  const auto time = fs::last_write_time(changed);
+  writePng(changed, ImageU8(16, 12, 3, 99));
+  fs::last_write_time(changed, time);
+  EXPECT_FALSE(contains(run(), "capture    finished before"));
+}
+
+TEST_F(PhotoRuns, AreNotRepeatedForAnotherPlaceOfTheSameList) {
+  writePosed(9);
+  writeFileAtomically(folder_ / "a.txt", "images/a3.png\n");
+  options_.holdout = "list:" + (folder_ / "a.txt").string();
+  EXPECT_TRUE(contains(run(), "9 photos, 1 held out"));
+  fs::rename(folder_ / "a.txt", folder_ / "b.txt");
+  options_.holdout = "list:" + (folder_ / "b.txt").string();
+  EXPECT_TRUE(contains(run(), "capture    finished before"));
+  writeFileAtomically(folder_ / "b.txt", "images/a3.png\nimages/a4.png\n");
+  EXPECT_TRUE(contains(run(), "9 photos, 2 held out"));
+}
+
+// The only photo that the source holds out ends early, and the import drops it.
+TEST_F(PhotoRuns, AreNotEvaluatedIfTheImportDropsWhatIsHeldOut) {
+  std::string trained;
+  for (int i = 0; i < 8; ++i) trained += std::string(i > 0 ? "," : "") + "\"images/a" + std::to_string(i) + ".png\"";
+  writePosed(9, "\"test_filenames\":[\"images/a8.png\"],\"train_filenames\":[" + trained + "],");
+  const std::string png = readTextFile(options_.photos / "images/a8.png");
+  writeFileAtomically(options_.photos / "images/a8.png", png.substr(0, png.size() - 20));
+  options_.program = "/bin/true";  // trains and bakes nothing
+  options_.range.until = "evaluate";
+  const std::string said = run();
+  EXPECT_TRUE(contains(said, "8 photos, 0 held out")) << said;
+  EXPECT_TRUE(contains(said, "no photo is held out")) << said;
+}
+
 TEST_F(PhotoRuns, RefuseFoldersOfOtherPrograms) {
   writePosed(9);
   for (const char* name : {"probe", "logs", "scene"}) {
@@ -214,6 +255,8 @@ TEST_F(PhotoRuns, OfPosedPhotosDoNotReplaceThem) {
   options_.photos = options_.out / "capture";
   writePosed(3);
   writeFileAtomically(options_.out / "run.json", "{}");
+  EXPECT_TRUE(contains(run(), "is the capture that would be written"));
+  options_.photos /= "transforms.json";
   EXPECT_TRUE(contains(run(), "is the capture that would be written"));
 }
 

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/file_digest.h"
 #include "base/image_io.h"
 #include "base/log.h"
 #include "base/order_statistics.h"
@@ -16,16 +17,10 @@
 #include "photogrammetry/photo_masks.h"
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
+#include "pipeline/run_request.h"
 
 namespace tessera {
 namespace {
-
-std::string describeFileTime(const fs::path& file) {
-  std::error_code status;
-  if (file.empty() || !fs::is_regular_file(file, status)) return "-";
-  return fmt::format("{} {}", fs::file_size(file, status),
-                     fs::last_write_time(file, status).time_since_epoch().count());
-}
 
 std::string describe(const Capture& capture) {
   std::string text = fmt::format("{} points, {} observations\n", capture.points.size(), capture.observations.size());
@@ -54,7 +49,7 @@ std::string describe(const Capture& capture) {
       text += fmt::format(" {} {} {} {}", photo.gps->latitude, photo.gps->longitude, photo.gps->altitude,
                           photo.gps->relativeAltitude);
     }
-    for (const fs::path& file : {photo.image, photo.mask, photo.depth}) text += " " + describeFileTime(file);
+    for (const fs::path& file : {photo.image, photo.mask, photo.depth}) text += " " + fileDigest(file);
     text += "\n";
   }
   Vec3d sum = Vec3d::Zero();
@@ -78,7 +73,7 @@ std::optional<PosedSource> PosedSource::open(const PhotoRunOptions& options) {
   const std::string format = sourceFormat(options.photos);
   if (format.empty()) return std::nullopt;
   if (options.frames > 0) throw Error("--frames", "", "concerns videos, and this is none", "leave it out");
-  if (fs::weakly_canonical(options.photos) == fs::weakly_canonical(options.out / "capture")) {
+  if (liesIn(options.photos, options.out / "capture")) {
     throw Error(options.photos.string(), "", "is the capture that would be written",
                 "name another folder to write to, or the photos that it was made from");
   }
@@ -93,7 +88,7 @@ PosedSource::PosedSource(const PhotoRunOptions& options)
   std::string flags;
   for (const bool isInverted : source_.maskIsInverted) flags += isInverted ? '1' : '0';
   for (const double unit : source_.exrUnit) flags += fmt::format(" {}", unit);
-  digest_ = textDigest(describe(capture) + flags);
+  digest_ = textDigest(describe(capture) + flags + (source_.hasOwnSplit ? " split" : ""));
   std::vector<int> sides;
   std::vector<int64_t> pixels;
   std::vector<Photo> readable;
@@ -145,6 +140,7 @@ TrainingNeeds PosedSource::trainingNeeds(int downscale) const {
   TrainingSize size = size_;
   size.photoPixels /= int64_t{downscale} * downscale;
   size.threads = options_->threads;
+  size.isLinked = downscale == 1 && areOnOneDisk(options_->photos, options_->out);
   return planTraining(size, options_->costs);
 }
 

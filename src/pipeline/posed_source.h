@@ -21,12 +21,12 @@ class PosedSource {
   // out, and the georeference.
   SourceCapture take(const fs::path& poses);
 
-  // A digest of poses, cameras and points, and of the sizes and times of photos, masks and depth maps.
+  // A digest of poses, cameras, points and splits, and of the contents of photos, masks and depth maps (fileDigest).
   const std::string& digest() const { return digest_; }
   const std::vector<ListedPhoto>& photos() const { return photos_; }  // names and files alone
   // How large the capture is if its photos keep their size; where a photo cannot be read, its camera tells it.
   const TrainingSize& trainingSize() const { return size_; }
-  bool holdsOut() const { return size_.heldOut > 0; }  // whether photos are held out to evaluate on
+  bool holdsOut() const { return size_.heldOut > 0; }  // whether photos are held out, if none is dropped at import
   TrainingNeeds trainingNeeds(int downscale) const;
 
  private:

@@ -36,7 +36,8 @@ int64_t RunEstimator::expectedPairs() {
   std::error_code status;
   if (expectedPairs_ == 0 && fs::exists(file, status)) {
     try {
-      expectedPairs_ = static_cast<int64_t>(readPairs(file, list_.photos.size()).pairs.size());
+      const ChosenPairs chosen = readPairs(file, list_.photos.size());
+      if (chosen.photos == photosDigest_) expectedPairs_ = static_cast<int64_t>(chosen.pairs.size());
     } catch (const Error&) {  // of other photos, or damaged: they are chosen anew
     }
   }
@@ -53,21 +54,21 @@ MatchingNeeds RunEstimator::matchingNeeds() {
   MatchingSize size{
       .photos = static_cast<int64_t>(list_.photos.size()), .pairs = expectedPairs(), .threads = threads()};
   for (const CameraBody& body : list_.bodies) size.pixels = std::max(size.pixels, int64_t{body.width} * body.height);
-  if (counts.photos == size.photos) size.features = counts.features;
-  if (counts.pairs >= size.pairs) size.inliers = counts.inliers;
+  if (counts.photos == size.photos) {
+    size.features = counts.features;
+    if (counts.pairs >= size.pairs) size.inliers = counts.inliers;
+  }
   return planMatching(size, rates());
 }
 
 StageNeeds RunEstimator::featureNeeds(bool resumes) {
-  StageNeeds needs = matchingNeeds().features;
-  if (resumes) needs.seconds *= 1 - static_cast<double>(matches_.count().photos) / list_.photos.size();
-  return needs;
+  const double share = static_cast<double>(matches_.count().photos) / static_cast<double>(list_.photos.size());
+  return withoutDone(matchingNeeds().features, resumes ? share : 0);
 }
 
 StageNeeds RunEstimator::matchNeeds(bool resumes) {
-  StageNeeds needs = matchingNeeds().matches;
-  if (resumes) needs.seconds *= std::max(0.0, 1 - static_cast<double>(matches_.count().pairs) / expectedPairs());
-  return needs;
+  const double share = static_cast<double>(matches_.count().pairs) / static_cast<double>(expectedPairs());
+  return withoutDone(matchingNeeds().matches, resumes ? share : 0);
 }
 
 const TrainingSize& RunEstimator::trainingSize() {
@@ -100,6 +101,7 @@ TrainingNeeds RunEstimator::trainingNeeds(int downscale) {
   size.photoPixels /= int64_t{downscale} * downscale;
   size.relativeSeconds = relativeSeconds(rates());
   size.threads = options_.threads;
+  size.isLinked = downscale == 1 && areOnOneDisk(list_.photos.front().file, options_.out);
   return planTraining(size, options_.costs);
 }
 

@@ -1,12 +1,14 @@
 #include "pipeline/run_plan.h"
 
 #include <fmt/format.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <thread>
 
 #include "base/error.h"
@@ -185,7 +187,7 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
   needs.capture = {
       isReduced ? photos * static_cast<double>(size.sourcePixels) * kImportSeconds * speed : photos * 0.005,
       32 * kMiB + static_cast<int64_t>(kImportBytes * atOnce),
-      static_cast<int64_t>(static_cast<double>(size.sourceBytes) * shrunk)};
+      size.isLinked ? 0 : static_cast<int64_t>(static_cast<double>(size.sourceBytes) * shrunk)};
   const double training = size.steps > 0 ? static_cast<double>(size.steps) * costs.secondsPerStep * speed
                                          : kSecondsPerMinute * size.minutes;
   needs.train = {
@@ -200,6 +202,23 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
     needs.evaluate = {kStartAndEnd + heldOut * pixels * 1e-6 * costs.secondsPerRenderedMegapixel * speed,
                       costs.trainBytes / 2, 0};
   return needs;
+}
+
+StageNeeds withoutDone(StageNeeds needs, double share) {
+  const double left = std::clamp(1 - share, 0.0, 1.0);
+  needs.seconds *= left;
+  needs.diskBytes = static_cast<int64_t>(left * static_cast<double>(needs.diskBytes));
+  return needs;
+}
+
+bool areOnOneDisk(const fs::path& a, const fs::path& b) {
+  const auto disk = [](fs::path path) -> std::optional<dev_t> {
+    struct stat status {};
+    for (path = fs::absolute(path); ::stat(path.c_str(), &status) != 0; path = path.parent_path())
+      if (path == path.parent_path()) return std::nullopt;
+    return status.st_dev;
+  };
+  return disk(a) && disk(a) == disk(b);
 }
 
 int chooseDownscale(const TrainingSize& size, const TrainingCosts& costs) {

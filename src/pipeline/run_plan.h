@@ -73,6 +73,7 @@ struct TrainingSize {
   int64_t steps = 0;           // steps, if above 0
   double relativeSeconds = 1;  // that this machine takes for what takes two cores one
   int threads = 0;             // of the import; 0: all
+  bool isLinked = false;       // whether the capture links the photos instead of copying them
 };
 
 struct TrainingNeeds {
@@ -96,6 +97,12 @@ void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes,
 
 // States what a plan takes, if that is long, and refuses what does not fit, as requireRoom.
 void announcePlan(const RunPlan& plan, const fs::path& folder);
+
+// Returns what is left of a stage of which this share, from 0 to 1, is done.
+StageNeeds withoutDone(StageNeeds needs, double share);
+
+// Whether files on one of these paths, which need not exist yet, can be links to files on the other.
+bool areOnOneDisk(const fs::path& a, const fs::path& b);
 
 // How many seconds this machine takes for what two cores do in one, by its rates.
 double relativeSeconds(const MatchingRates& rates);

@@ -141,10 +141,10 @@ class RunPage {
       html += " · <a href=\"evaluation.html\">evaluation of the held-out photos</a>";
     html += "</p>\n<div class=\"cards\">\n";
     const size_t used = input_.photos.size();
-    html += summaryCard(std::to_string(used), input_.leftOut.empty()
-                                                  ? "photos used"
-                                                  : fmt::format("photos used, {} left out", input_.leftOut.size()));
-    html += summaryCard(std::to_string(used - std::min(used, withoutPose_.size())), "photos with poses");
+    html +=
+        summaryCard(std::to_string(used),
+                    input_.leftOut.empty() ? "photos" : fmt::format("photos, and {} left out", input_.leftOut.size()));
+    html += summaryCard(std::to_string(used - std::min(used, withoutPose_.size())), "photos in the scene");
     html += georeference_.reason.empty()
                 ? summaryCard("± " + formatMetres(georeference_.middleError), "georeference, standard error")
                 : summaryCard("none", "georeference: " + georeference_.reason);
@@ -191,6 +191,10 @@ class RunPage {
     }
     if (!georeference_.hasAltitudes)
       html += "<li>GPS states no altitudes: the cameras are taken to be at height 0 of the Earth, on average.</li>\n";
+    if (georeference_.ignoresTakeOff)
+      html +=
+          "<li>Heights above take-off do not fit the poses, as if flights started at other heights: absolute altitudes "
+          "are used.</li>\n";
     NamesByReason unusable, withoutPose;
     for (const LeftOutPhoto& photo : input_.leftOut) unusable[photo.reason].push_back(photo.name);
     for (const LeftOutPhoto& photo : withoutPose_) withoutPose[photo.reason].push_back(photo.name);
@@ -209,7 +213,7 @@ class RunPage {
             nameList(fmt::format("{} {}: {}", plural(names.size(), "photo"), what, escapedHtml(reason)), names));
       }
     };
-    addGroups(withoutPose, "without a pose");
+    addGroups(withoutPose, "not in the scene");
     addGroups(unusable, "not used");
     return html.empty() ? "<h2>Warnings</h2>\n<p>None: all photos are in the scene.</p>\n"
                         : "<h2>Warnings</h2>\n<ul class=\"warnings\">\n" + html + "</ul>\n";

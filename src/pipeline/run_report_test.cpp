@@ -79,7 +79,7 @@ class RunReport : public testing::Test {
 TEST_F(RunReport, SummarisesTheRun) {
   const std::string html = page();
   for (const char* part :
-       {"<b>4</b><span class=\"quiet\">photos used</span>", "<b>4</b><span class=\"quiet\">photos with poses</span>",
+       {"<b>4</b><span class=\"quiet\">photos</span>", "<b>4</b><span class=\"quiet\">photos in the scene</span>",
         "<b>± 0.25 m</b>", "<b>20.32 dB</b><span class=\"quiet\">PSNR of 3 held-out photos</span>", "<b>0.5364</b>",
         "<b>volume</b>", "<b>1.5 MB</b>", "held-out photos: neutral, as they were rendered", "<td>1.25 %</td>",
         "4 of 4 GPS fixes agree", "href=\"evaluation.html\"", "None: all photos are in the scene",
@@ -117,13 +117,13 @@ TEST_F(RunReport, NamesPhotosThatAreLeftOutByReason) {
   writeLeftOut(out_ / "poses/left_out.json", {{"3.jpg", "truncated"}, {"2.jpg", kOfAnotherModel}});
   const std::string html = page();
   EXPECT_NE(html.find("2 photos not used: in another format: <span class=\"quiet\">x.dng, y.dng<"), std::string::npos);
-  EXPECT_NE(html.find("1 photo without a pose: truncated: <span class=\"quiet\">3.jpg<"), std::string::npos);
+  EXPECT_NE(html.find("1 photo not in the scene: truncated: <span class=\"quiet\">3.jpg<"), std::string::npos);
   EXPECT_NE(html.find("several models, of which the scene shows the largest; 1 photo is in another: <span "
                       "class=\"quiet\">2.jpg<"),
             std::string::npos);
   EXPECT_EQ(countParts(html, "2.jpg<"), 2u) << "in the warning and below its picture";
-  EXPECT_NE(html.find("<b>2</b><span class=\"quiet\">photos with poses<"), std::string::npos);
-  EXPECT_NE(html.find("photos used, 2 left out"), std::string::npos);
+  EXPECT_NE(html.find("<b>2</b><span class=\"quiet\">photos in the scene<"), std::string::npos);
+  EXPECT_NE(html.find("photos, and 2 left out"), std::string::npos);
   EXPECT_EQ(html.find("all photos are in the scene"), std::string::npos);
 }
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "base/error.h"
 #include "base/log.h"
@@ -27,13 +28,17 @@ struct Record {
   StageNeeds expected;
 };
 
+// Returns what run.json of an earlier run says; nothing if the file is missing or damaged.
+Json readRun(const fs::path& file) {
+  constexpr uint64_t kMaxBytes = 1 << 20;
+  std::error_code status;
+  return fs::exists(file, status) ? Json::parse(readTextFile(file, kMaxBytes), nullptr, false) : Json();
+}
+
 // What run.json of an earlier run says of stages; nothing if the file is missing or damaged: then all is run again.
 std::vector<std::pair<std::string, Record>> readRecords(const fs::path& file, std::string& begunFrom) {
   std::vector<std::pair<std::string, Record>> records;
-  constexpr uint64_t kMaxBytes = 1 << 20;
-  std::error_code status;
-  if (!fs::exists(file, status)) return records;
-  const Json run = Json::parse(readTextFile(file, kMaxBytes), nullptr, false);
+  const Json run = readRun(file);
   if (!run.is_object() || !run.contains("stages") || !run["stages"].is_array()) return records;
   if (run.contains("begun_from") && run["begun_from"].is_string()) begunFrom = run["begun_from"].get<std::string>();
   for (const Json& stage : run["stages"]) {
@@ -91,15 +96,20 @@ std::string describeClock(double seconds) {
 
 // What an earlier call has left to do.
 struct Remaining {
-  std::vector<std::string> digests;  // of all stages
-  size_t first = 0, end = 0;         // the stages to run
-  std::vector<Record> known;         // of the stages before these
-  bool resumes = false;              // the first of them was interrupted
+  std::vector<std::string> digests;   // of all stages
+  size_t first = 0, end = 0;          // the stages to run
+  std::vector<Record> known;          // of the stages before these
+  std::optional<Record> interrupted;  // the first of them, if it was
 };
 
 Remaining findRemaining(const fs::path& folder, const std::vector<Stage>& stages, const StageRange& range) {
   requireStage(stages, range.from, "--from");
   requireStage(stages, range.until, "--until");
+  const auto position = [&](const std::string& name) {
+    return std::find_if(stages.begin(), stages.end(), [&](const Stage& stage) { return stage.name == name; });
+  };
+  if (!range.from.empty() && !range.until.empty() && position(range.from) > position(range.until))
+    throw Error("--from " + range.from, "", "comes after --until " + range.until, "exchange them, or leave one out");
   std::string begunFrom;  // what an interrupted call was asked to run again from
   const auto before = readRecords(folder / kRecord, begunFrom);
   const bool wasInterrupted =
@@ -124,7 +134,7 @@ Remaining findRemaining(const fs::path& folder, const std::vector<Stage>& stages
         ++remaining.first;
       } else {
         again = true;
-        remaining.resumes = isKnown && !record->second.isFinished;
+        if (isKnown && !record->second.isFinished) remaining.interrupted = record->second;
       }
     }
     if (stage.name == range.until) break;
@@ -135,7 +145,7 @@ Remaining findRemaining(const fs::path& folder, const std::vector<Stage>& stages
 RunPlan planRemaining(const std::vector<Stage>& stages, const Remaining& remaining) {
   RunPlan plan;
   for (size_t i = remaining.first; i < remaining.end; ++i)
-    plan.entries.push_back({stages[i].name, stages[i].needs(i == remaining.first && remaining.resumes)});
+    plan.entries.push_back({stages[i].name, stages[i].needs(i == remaining.first && remaining.interrupted)});
   return plan;
 }
 
@@ -181,11 +191,20 @@ RunPlan planStages(const fs::path& folder, const std::vector<Stage>& stages, con
   return planRemaining(stages, findRemaining(folder, stages, range));
 }
 
-void runStages(const fs::path& folder, const std::string& request, const std::vector<Stage>& stages,
+std::map<std::string, std::string> readFlags(const fs::path& folder) {
+  std::map<std::string, std::string> flags;
+  const Json run = readRun(folder / kRecord);
+  if (!run.is_object() || !run.contains("flags") || !run["flags"].is_object()) return flags;
+  for (const auto& [name, value] : run["flags"].items())
+    if (value.is_string()) flags[name] = value.get<std::string>();
+  return flags;
+}
+
+void runStages(const fs::path& folder, const RunRequest& request, const std::vector<Stage>& stages,
                const StageRange& range, const std::function<void()>& check) {
   const Remaining remaining = findRemaining(folder, stages, range);
   const fs::path file = folder / kRecord;
-  Json run = {{"version", 1}, {"request", request}, {"stages", Json::array()}};
+  Json run = {{"version", 1}, {"request", request.command}, {"flags", request.flags}, {"stages", Json::array()}};
   if (!range.from.empty()) run["begun_from"] = range.from;
   const auto record = [&run](const StageNeeds& total) {
     run["expected"] = {{"seconds", total.seconds}, {"peak_bytes", total.memoryBytes}, {"disk_bytes", total.diskBytes}};
@@ -199,24 +218,47 @@ void runStages(const fs::path& folder, const std::string& request, const std::ve
     const Stage& stage = stages[i];
     check();
     // What it left is discarded before the record says that the stage may be resumed.
-    const bool resumes = i == remaining.first && remaining.resumes;
+    const bool resumes = i == remaining.first && remaining.interrupted.has_value();
     if (!resumes) {
       write(run, file);
       stage.discard();
     }
-    Record result{.digest = remaining.digests[i], .expected = stage.needs(resumes)};
-    Json begun = run;
-    begun["stages"].push_back(toJson(stage.name, result));
-    write(begun, file);
-    if (i > remaining.first && result.expected.seconds > kLongSeconds)
-      inform("{} will take about {}", stage.name, describeDuration(result.expected.seconds));
+    const StageNeeds needs = stage.needs(resumes);
+    // What interrupted attempts took counts.
+    const Record before = resumes ? *remaining.interrupted : Record{.expected = needs};
+    Record result{.digest = remaining.digests[i],
+                  .seconds = before.seconds,
+                  .peakBytes = before.peakBytes,
+                  .expected = before.expected};
+    const auto recordBegun = [&] {
+      Json begun = run;
+      begun["stages"].push_back(toJson(stage.name, result));
+      write(begun, file);
+    };
+    recordBegun();
+    if (i > remaining.first && needs.seconds > kLongSeconds)
+      inform("{} will take about {}", stage.name, describeDuration(needs.seconds));
     const bool measuresPeak = restartPeakResidentBytes();
     const auto start = std::chrono::steady_clock::now();
-    const StageOutcome outcome = stage.run(resumes);
+    const auto count = [&](int64_t peakOfPrograms) {
+      result.seconds = before.seconds + std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      result.peakBytes =
+          std::max({before.peakBytes, peakOfPrograms, measuresPeak ? peakResidentBytes() : residentBytes()});
+    };
+    StageOutcome outcome;
+    try {
+      outcome = stage.run(resumes);
+    } catch (...) {
+      count(0);
+      try {
+        recordBegun();
+      } catch (const Error&) {  // what ended the stage matters more
+      }
+      throw;
+    }
+    count(outcome.peakBytes);
     result.isFinished = true;
     result.summary = outcome.summary;
-    result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    result.peakBytes = std::max(outcome.peakBytes, measuresPeak ? peakResidentBytes() : residentBytes());
     RunPlan later;
     for (size_t k = i + 1; k < remaining.end; ++k) later.entries.push_back({stages[k].name, stages[k].needs(false)});
     const double left = later.total().seconds;

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -66,13 +67,23 @@ struct RunPlan {
 // Plans what `runStages` would run. Throws Error if a stage of `range` does not exist.
 RunPlan planStages(const fs::path& folder, const std::vector<Stage>& stages, const StageRange& range);
 
+// What run.json says of what was asked for.
+struct RunRequest {
+  std::string command;                       // for people
+  std::map<std::string, std::string> flags;  // values by name, for readFlags
+};
+
 // Runs the stages in order, and prints a line for each on stdout, with the time that those after it will take. run.json
-// records what they were expected to take, all before the first one runs, and each when it begins. `request` describes
-// the run in run.json. Throws Error if a stage of `range` does not exist, and what a stage or `check` throws, which is
-// called before each stage that runs.
+// records what they were expected to take, all before the first one runs, and each when it begins. What interrupted
+// attempts at a stage took is added to its record, unless they were killed. Throws Error if a stage of `range` does not
+// exist or the last one precedes the first, and what a stage or `check` throws, which is called before each stage that
+// runs.
 void runStages(
-    const fs::path& folder, const std::string& request, const std::vector<Stage>& stages, const StageRange& range,
+    const fs::path& folder, const RunRequest& request, const std::vector<Stage>& stages, const StageRange& range,
     const std::function<void()>& check = [] {});
+
+// Returns the flags of the last run in this folder; nothing if run.json is missing or damaged.
+std::map<std::string, std::string> readFlags(const fs::path& folder);
 
 // Writes a run.json without stages if the folder has none: what is made in the folder from now on is a run's.
 void claimFolder(const fs::path& folder);

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <chrono>
+#include <thread>
+
 #include "base/error.h"
 #include "base/testing/temporary_folder.h"
 
@@ -33,7 +36,7 @@ class Stages : public testing::Test {
                             }});
     }
     try {
-      runStages(folder_.path(), "test", stages, range);
+      runStages(folder_.path(), {"test", {{"--minutes", "10"}}}, stages, range);
     } catch (const Error&) {
       ran += "failed";
     }
@@ -64,9 +67,38 @@ TEST_F(Stages, HaveNamesThatNeedNotBeUtf8) {
                         "dstadt"};
   };
   EXPECT_NO_THROW(runStages(folder_.path(),
-                            "run S\xfc"
-                            "d",
+                            {"run S\xfc"
+                             "d"},
                             {{.name = "one", .run = [&](bool) { return stage(); }}}, {}));
+}
+
+TEST_F(Stages, LeaveTheFlagsThatTheyWereRunWith) {
+  EXPECT_TRUE(readFlags(folder_.path()).empty());
+  run({"", "", ""});
+  EXPECT_EQ(readFlags(folder_.path()).at("--minutes"), "10");
+  writeFileAtomically(folder_ / "run.json", R"({"flags": {"--steps": 7, "--method": "volume"}})");
+  EXPECT_EQ(readFlags(folder_.path()).size(), 1u);
+  writeFileAtomically(folder_ / "run.json", "{");
+  EXPECT_TRUE(readFlags(folder_.path()).empty());
+}
+
+TEST_F(Stages, CountTheTimeOfInterruptedAttempts) {
+  int attempts = 0;
+  const std::vector<Stage> stages = {{.name = "one", .run = [&](bool) {
+                                        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+                                        if (++attempts < 3) throw Error("one", "", "fails", "repair it");
+                                        return StageOutcome{0, "done"};
+                                      }}};
+  for (int i = 0; i < 2; ++i) EXPECT_THROW(runStages(folder_.path(), {}, stages, {}), Error);
+  runStages(folder_.path(), {}, stages, {});
+  ASSERT_EQ(readStageRecords(folder_.path()).size(), 1u);
+  EXPECT_GE(readStageRecords(folder_.path())[0].seconds, 0.3);
+}
+
+TEST_F(Stages, AreRefusedIfTheLastPrecedesTheFirst) {
+  run({"", "", ""});
+  EXPECT_EQ(run({"", "", ""}, {.from = "three", .until = "two"}), "failed");
+  EXPECT_EQ(run({"", "", ""}, {.from = "two", .until = "two"}), "two ");
 }
 
 TEST_F(Stages, AreNotRepeated) {
@@ -130,7 +162,7 @@ TEST_F(Stages, AreNotBegunIfTheCheckThrows) {
                    return StageOutcome{};
                  }};
   };
-  EXPECT_THROW(runStages(folder_.path(), "test", {stage("a"), stage("b")}, {},
+  EXPECT_THROW(runStages(folder_.path(), {"test"}, {stage("a"), stage("b")}, {},
                          [&] {
                            if (ran == "a") throw Error("b", "", "is interrupted", "");
                          }),
@@ -162,12 +194,12 @@ TEST_F(Stages, ReadWhatIsRecordedOfThoseBeforeThem) {
                    return StageOutcome{int64_t{1} << 50, std::string("summary of ") + name};
                  }};
   };
-  runStages(folder_.path(), "test", {stage("a"), stage("b"), stage("c")}, {});
+  runStages(folder_.path(), {"test"}, {stage("a"), stage("b"), stage("c")}, {});
   ASSERT_EQ(records.size(), 2u) << "that of the stage itself is not finished";
   EXPECT_EQ(records[1].name, "b");
   EXPECT_EQ(records[1].summary, "summary of b");
   EXPECT_EQ(records[1].peakBytes, int64_t{1} << 50);
-  runStages(folder_.path(), "test", {stage("a"), stage("b"), stage("c")}, {.from = "c"});
+  runStages(folder_.path(), {"test"}, {stage("a"), stage("b"), stage("c")}, {.from = "c"});
   EXPECT_EQ(records.size(), 2u) << "finished before";
   writeFileAtomically(folder_ / "run.json", "{");
   EXPECT_TRUE(readStageRecords(folder_.path()).empty());
@@ -213,7 +245,7 @@ TEST(StagePlan, CountsWhatIsNotFinished) {
   EXPECT_EQ(all.total().diskBytes, 21);
   EXPECT_EQ(planStages(folder.path(), stages, {.until = "two"}).total().seconds, 120);
   EXPECT_THROW(planStages(folder.path(), stages, {.until = "four"}), Error);
-  EXPECT_THROW(runStages(folder.path(), "test", stages, {}), Error);
+  EXPECT_THROW(runStages(folder.path(), {"test"}, stages, {}), Error);
   const RunPlan left = planStages(folder.path(), stages, {});
   ASSERT_EQ(left.entries.size(), 2U);
   EXPECT_EQ(left.entries[0].stage, "two");
@@ -228,7 +260,7 @@ TEST(StagePlan, IsRecordedBeforeTheFirstStageAndForEach) {
     if (name == "two") record = readTextFile(folder / "run.json");
   });
   testing::internal::CaptureStdout();
-  runStages(folder.path(), "test", stages, {});
+  runStages(folder.path(), {"test"}, stages, {});
   const std::string printed = testing::internal::GetCapturedStdout();
   EXPECT_NE(record.find("\"seconds\": 180"), record.npos) << record;
   EXPECT_NE(record.find("\"expected_seconds\": 60"), record.npos) << record;
@@ -243,7 +275,7 @@ TEST(StagePlan, IsRecordedAnewAfterAStageThatRevealsIt) {
   for (Stage& stage : stages)
     stage.needs = [&isKnown](bool) { return isKnown ? StageNeeds{60, 1000, 7} : StageNeeds{}; };
   stages[0].revealsNeeds = true;
-  runStages(folder.path(), "test", stages, {});
+  runStages(folder.path(), {"test"}, stages, {});
   const std::string record = readTextFile(folder / "run.json");
   EXPECT_NE(record.find("\"seconds\": 120"), record.npos) << record;
   EXPECT_NE(record.find("\"disk_bytes\": 14"), record.npos) << record;

@@ -1,0 +1,19 @@
+// How far the training of a model has come.
+#pragma once
+
+#include <cstdint>
+
+#include "base/file.h"
+
+namespace tessera {
+
+struct TrainingProgress {
+  int64_t step = 0;          // steps done
+  int64_t plannedSteps = 0;  // 0: not known yet
+  double seconds = 0;        // of the steps done, while it is not known how many are planned
+};
+
+// Returns what manifest.json of a model says; zeros if it is missing or damaged.
+TrainingProgress readTrainingProgress(const fs::path& model);
+
+}  // namespace tessera
