@@ -60,6 +60,14 @@ def stage_in_progress(out):
     return next((stage["name"] for stage in json.loads(text)["stages"] if not stage["finished"]), None)
 
 
+def trained_steps(out):
+    """The steps of the last checkpoint of the model; 0 if there is none."""
+    try:
+        return json.load(open(os.path.join(out, "model", "manifest.json")))["step"]
+    except OSError:
+        return 0
+
+
 def version(out):
     try:
         status = os.stat(os.path.join(out, "run.json"))
@@ -141,7 +149,7 @@ def main():
                 where = stage_in_progress(out) or "between stages"
                 seconds = time.time() - begin - 1
                 attempts.append({"target": name, "killed_in": where, "running": was_running, "again": missed,
-                                 "seconds": seconds})
+                                 "seconds": seconds, "steps": trained_steps(out) if where == "train" else 0})
                 print(f"killed in {where} after {seconds:.1f} s, {programs} children, {left} survived", flush=True)
                 if was_running and where in reached:
                     reached[where] += 1
@@ -153,11 +161,14 @@ def main():
     process.communicate()
     attempts.append({"target": None, "seconds": time.time() - begin, "status": process.returncode})
     kills = [attempt for attempt in attempts if attempt.get("running") and not attempt["again"]]
-    # What a kill destroys is at most what was done since the program had started.
+    # What a kill destroys is at most what was done since the program had started, and on average what all attempts took
+    # longer than the unbroken run.
+    seconds, whole = sum(attempt["seconds"] for attempt in attempts), sum(unbroken.values())
     json.dump({"attempts": attempts, "survivors": survivors, "kills": len(kills), "reached": reached,
-               "status": attempts[-1]["status"], "seconds": sum(attempt["seconds"] for attempt in attempts),
-               "unbroken_seconds": sum(unbroken.values()),
-               "repeated_seconds_at_most": max(attempt["seconds"] for attempt in kills)}, open(record, "w"), indent=1)
+               "status": attempts[-1]["status"], "seconds": seconds, "unbroken_seconds": whole,
+               "repeated_seconds_at_most": max(attempt["seconds"] for attempt in kills),
+               "repeated_seconds_mean": (seconds - whole) / len(kills),
+               "steps_kept": max(attempt["steps"] for attempt in kills)}, open(record, "w"), indent=1)
 
 
 main()

@@ -9,13 +9,15 @@
 #   exposure  brighton_beach at 400x225, ten minutes of `field`: exposures predicted from EXIF at least 0.4 dB above neutral, and on
 #             the right halves of the views at most 0.2 dB below fitted ones
 #   killed    brighton_beach to an evaluated scene of `volume`, killed 20 times, at least once in each stage: all photos get poses, at most
-#             three minutes are repeated each time, no program survives, and the scene has the bytes of an unbroken training
+#             three minutes are repeated each time, training goes on from a checkpoint, no program survives, and the scene has the
+#             bytes of an unbroken training; then the poses of the survey, killed 10 times more than it has stages
 #   against   brighton_beach at 400x225 and fox at 270x480, with the poses of `run` and with the poses that the data has: the scenes of
 #             ten minutes of the default method, held-out PSNR at most 0.3 dB lower, mean of the seeds
 #   methods   which method is best after ten minutes: scenes of brighton_beach, fox and a city of 2x2 blocks
 #   reduced   by what photographs are best divided for ten minutes of training: 1, 2 and 4, judged in views divided by 2
-#   jitter    a city whose photographs differ by half a stop: a model of it, compared with the held-out views of the same city without
-#             these differences, at most 0.3 dB below a model of that one; with the exposures of EXIF shuffled, too
+#   jitter    a city whose photographs differ by half a stop: a scene of it, compared with the held-out views of the same city without
+#             these differences, at most 0.3 dB below a scene of that one; with the exposures of EXIF shuffled, which train the same
+#             weights, predicted exposures are refused, or at most 0.1 dB below neutral ones, in the photographs as they are
 #   sizes     surveys of cities of 1x2 and 3x3 blocks with an overlap of 77 %, 122 and 487 photographs of 800x600: minutes and memory of
 #             each stage up to georeferenced poses, the larger one in at most 90 minutes, and at most 1.5 times as long for each photo
 #   untagged  the same photographs as in survey, without EXIF and XMP: at least 95 % get poses, none more than 1 m off
@@ -23,8 +25,8 @@
 # Resumable: everything is kept in build/bench/photos, and what exists is not made again.
 #   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox served against methods reduced exposure jitter killed survey sizes untagged"] \
 #     [SEEDS="1 2 3"] [MINUTES=10] [STEPS=N] [METHOD=hash] bench/photos.sh
-# With STEPS, trainings have that many steps instead of minutes, so that other programs do not matter; those of killed, 300 if it is
-# not given.
+# With STEPS, trainings have that many steps instead of minutes, so that other programs do not matter; those of killed, 1500 if it is
+# not given, which take several checkpoints.
 set -euo pipefail
 source "$(dirname "$0")/setup.sh"
 need_tessera
@@ -37,7 +39,9 @@ length=(--minutes "${MINUTES:-10}")
 
 # posed NAME PHOTOS: finds the poses, and prints minutes and memory of each stage.
 posed() {
+  local began=$SECONDS
   "$tessera" run "$2" "$work/$1" --until capture --holdout none
+  echo "$1: $((SECONDS - began)) s, with what precedes the first stage"
   jq -r '.stages[] | select(.seconds >= 1) |
     "\(.name): \(.seconds / 6 | round / 10) min, \(.peak_bytes / 1048576 | round) MiB: \(.summary)"' "$work/$1/run.json"
   planned "$1"
@@ -145,6 +149,9 @@ against_poses() {
     cp -r "$work/$1-posed/capture" "$work/$1-own"
   }
   imported "$1-given" "$2" "$3"
+  # Every eighth photo is held out: the same ones, if none lacks a pose.
+  [ "$(jq '.frames | length' "$work/$1-own/transforms.json")" = "$(jq '.frames | length' "$work/$1-given/transforms.json")" ] ||
+    die "$work/$1-own: lacks photos of $work/$1-given, so that others are held out"
   for seed in ${SEEDS:-1 2 3}; do
     own=$(scene_of "$1-own" "$method" "$seed" "$1-own") given=$(scene_of "$1-given" "$method" "$seed" "$1-given")
     echo "$1, seed $seed: $own dB with the poses of run, $given dB with the given ones"
@@ -183,7 +190,7 @@ exposure() {
 }
 
 jitter() {
-  local seed steady=() jittered=() shuffled=()
+  local seed capture steady=() jittered=()
   local city=(--blocks 1x1 --photos 72 --size 400x300)
   [ -e "$work/steady/transforms.json" ] || "$tessera" synth city "$work/steady" "${city[@]}"
   [ -e "$work/jittered/transforms.json" ] || "$tessera" synth city "$work/jittered" "${city[@]}" --exposure-jitter 0.5
@@ -194,23 +201,33 @@ jitter() {
       (.; .frames[$i].tessera.exposure = $all[($i * 29 + 7) % ($all | length)])' "$work/jittered/transforms.json" > "$work/shuffled.partial/transforms.json"
     mv "$work/shuffled.partial" "$work/shuffled"
   }
-  # judged CAPTURE SEED: a model of it, compared with the held-out views without jitter.
-  judged() {
-    local name=$1-field-$2${STEPS:+-$STEPS}
-    trained "$name" "$1" --method field "${length[@]}" --seed "$2" >&2
-    [ -s "$work/$name.json" ] || "$tessera" eval "$work/$name" "$work/steady" --json "$work/$name.json" \
-      --report "$work/$name.html" ${lpips:+--lpips "$lpips"} >&2
-    jq .psnr "$work/$name.json"
-  }
+  local method=${METHOD:-hash}
   for seed in ${SEEDS:-1 2 3}; do
-    steady+=("$(judged steady "$seed")") jittered+=("$(judged jittered "$seed")") shuffled+=("$(judged shuffled "$seed")")
-    echo "city, seed $seed: ${steady[-1]} dB, with jitter ${jittered[-1]} dB, with EXIF shuffled, too, ${shuffled[-1]} dB"
+    steady+=("$(scene_of steady "$method" "$seed" steady)") jittered+=("$(scene_of jittered "$method" "$seed" steady)")
+    echo "city, seed $seed: ${steady[-1]} dB, with jitter ${jittered[-1]} dB"
   done
   mean() { printf '%s\n' "$@" | jq -s 'add / length'; }
   verdict "city, trained with jitter less without, mean held-out PSNR in dB" \
     "$(shortfall "$(mean "${jittered[@]}")" "$(mean "${steady[@]}")")" '>=' -0.3
-  verdict "city, EXIF shuffled less EXIF, mean held-out PSNR in dB" \
-    "$(shortfall "$(mean "${shuffled[@]}")" "$(mean "${jittered[@]}")")" '>=' -0.1
+  # exposed_scene CAPTURE HOW: in the photographs as they are; 0 if the scene cannot predict exposures.
+  exposed_scene() {
+    local name=$1-$method-1${STEPS:+-$STEPS}
+    "$tessera" eval "$work/$name.scene" "$work/$1" --exposure "$2" --json "$work/$name-$2.json" > "$work/$name-$2.log" 2>&1 || {
+      grep -q "exposure" "$work/$name-$2.log" || die "$work/$name-$2.log: $(tail -1 "$work/$name-$2.log")"
+      echo '{"psnr": 0}' > "$work/$name-$2.json"
+    }
+    jq .psnr "$work/$name-$2.json"
+  }
+  scene_of shuffled "$method" 1 steady > "$work/last"
+  local neutral predicted
+  for capture in jittered shuffled; do
+    neutral=$(exposed_scene "$capture" neutral) predicted=$(exposed_scene "$capture" predicted)
+    echo "$capture, seed 1, photographs as they are: neutral $neutral dB, predicted $predicted dB (0: refused)"
+    [ "$capture" = jittered ] || [ "$predicted" = 0 ] ||
+      verdict "city, EXIF shuffled, predicted less neutral, PSNR in dB" "$(shortfall "$predicted" "$neutral")" '>=' -0.1
+    [ "$capture" = shuffled ] ||
+      verdict "city, predicted less neutral, PSNR in dB" "$(shortfall "$predicted" "$neutral")" '>=' 0
+  done
 }
 
 # truth NAME BLOCKS OVERLAP: a survey with the true poses in NAME-truth, and its photographs alone, without them, in NAME-photos.
@@ -225,6 +242,15 @@ truth() {
 compared() { python3 bench/pose_errors.py "$work/$1" "$work/$2-truth" "$work/$1.json" > /dev/null; }
 value() { jq "$2" "$work/$1.json"; }
 
+# georeferenced NAME: scale, rotation and middle from GPS against the true ones.
+georeferenced() {
+  local what
+  for what in scale rotation_degrees middle_metres; do
+    verdict "$1, error of $what from GPS, in standard errors" \
+      "$(value "$1" ".georeference.$what / .georeference.predicted.$what | fabs")" '<=' 2
+  done
+}
+
 survey() {
   truth survey 2x2 75
   posed survey "$work/survey-photos"
@@ -233,11 +259,7 @@ survey() {
   verdict "survey, median error in metres" "$(value survey .shape.median_metres)" '<=' 0.1
   verdict "survey, median error in degrees" "$(value survey .shape.median_degrees)" '<=' 0.05
   verdict "survey, worst error in metres" "$(value survey .shape.worst_metres)" '<=' 0.5
-  local what
-  for what in scale rotation_degrees middle_metres; do
-    verdict "survey, error of $what from GPS, in standard errors" \
-      "$(value survey ".georeference.$what / .georeference.predicted.$what | fabs")" '<=' 2
-  done
+  georeferenced survey
 }
 
 sizes() {
@@ -249,6 +271,7 @@ sizes() {
     compared "$size" "$size"
     verdict "$size, share of $(value "$size" .photos) photos with poses" "$(value "$size" '.registered / .photos')" '>=' 0.98
     verdict "$size, worst error in metres" "$(value "$size" .shape.worst_metres)" '<=' 0.5
+    georeferenced "$size"
   done
   # seconds NAME: from the first stage to poses in metres.
   seconds() { jq '[.stages[] | select(.name != "capture") | .seconds] | add' "$work/$1/run.json"; }
@@ -283,7 +306,7 @@ PYTHON
 # A run to an evaluated scene, and the same killed again and again. Poses depend on the order in which threads end, so the
 # scenes are compared that result from one capture.
 killed() {
-  local method=(--method volume --steps "${STEPS:-300}" --downscale 4) record=$work/killed.json
+  local method=(--method volume --steps "${STEPS:-1500}" --downscale 4) record=$work/killed.json
   local photos=$data/brighton_beach/images seed=${SEED:-1}
   [ -s "$work/whole/eval.json" ] || "$tessera" run "$photos" "$work/whole" "${method[@]}"
   planned whole
@@ -301,8 +324,20 @@ killed() {
   verdict "the same, programs that survived" "$(jq .survivors "$record")" '<=' 0
   verdict "the same, status of the last attempt, which was not killed" "$(jq .status "$record")" '<=' 0
   verdict "the same, seconds repeated for a kill, at most" "$(jq .repeated_seconds_at_most "$record")" '<=' 180
+  verdict "the same, steps of a checkpoint at a kill, from which training went on" "$(jq .steps_kept "$record")" '>=' 1
   verdict "the same, files of the scene that differ from the unbroken one" \
     "$(diff -rq "$work/killed/scene" "$work/again/scene" 2>&1 | wc -l)" '<=' 0
+  # Long enough that the mapper takes snapshots.
+  truth survey 2x2 75
+  [ -s "$work/survey/run.json" ] || posed survey "$work/survey-photos"
+  rm -rf "$work/survey-killed"
+  record=$work/survey-killed.json
+  cp "$work/survey/run.json" "$record.unbroken"
+  python3 bench/kill_run.py "$seed" "$((10 + $(jq '.stages | length' "$work/survey/run.json")))" "$record" -- \
+    "$tessera" run "$work/survey-photos" "$work/survey-killed" --until capture --holdout none
+  verdict "survey, killed, share of photos with poses" "$(jq -n "$(registered survey-killed) / $(registered survey)")" '>=' 0.98
+  verdict "the same, programs that survived" "$(jq .survivors "$record")" '<=' 0
+  verdict "the same, seconds repeated for a kill, mean" "$(jq .repeated_seconds_mean "$record")" '<=' 180
 }
 
 for row in ${ROWS:-brighton fox served against methods reduced exposure jitter killed survey sizes untagged}; do "$row"; done

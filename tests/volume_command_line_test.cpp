@@ -69,6 +69,27 @@ class VolumeCommandLine : public testing::Test {
   static inline fs::path folder_;
 };
 
+// Exposures that EXIF states explain the gains that were trained, and model and scene know how.
+TEST_F(VolumeCommandLine, PredictsExposuresWhereExifExplainsThem) {
+  const Said synthesised = run({"synth", "city", at("jittered"), "--blocks", "1x1", "--photos", "16", "--size", "48x36",
+                                "--samples", "1", "--seed", "3", "--exposure-jitter", "1"});
+  ASSERT_EQ(synthesised.exitCode, 0) << synthesised.err;
+  std::vector<std::string> arguments = trainArguments(at("exposed"), {"--steps", "200"});
+  arguments[1] = at("jittered");
+  ASSERT_EQ(run(arguments).exitCode, 0);
+  ASSERT_EQ(run({"bake", at("exposed"), at("exposed.scene")}).exitCode, 0);
+  for (const std::string& what : {at("exposed"), at("exposed.scene")}) {
+    const Said said = run({"eval", what, at("jittered"), "--exposure", "predicted"});
+    EXPECT_EQ(said.exitCode, 0) << said.err;
+    EXPECT_TRUE(contains(said.out + said.err, "exposure predicted from EXIF")) << said.out << said.err;
+  }
+  for (const std::string& what : {model(), scene()}) {
+    const Said said = run({"eval", what, at("city"), "--exposure", "predicted"});
+    EXPECT_EQ(said.exitCode, 1) << "all photos of this city have one exposure";
+    EXPECT_TRUE(contains(said.err, "EXIF")) << said.err;
+  }
+}
+
 TEST_F(VolumeCommandLine, GoesTheWholeWayFromACityToThePicturesOfAScene) {
   for (const char* file : {"blocks.svg", "blocks.geojson", "blocks.json", "config.toml"}) {
     EXPECT_TRUE(fs::exists(fs::path(model()) / file)) << file;

@@ -20,7 +20,7 @@ int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes);
 int64_t extractionBytes(int threads, int64_t pixels);
 
 // The reason that `explain` gives for photos of another model.
-inline constexpr char kOfAnotherModel[] = "of another place: they match each other, but not the rest";
+inline constexpr char kOfAnotherModel[] = "in another model, of another place or with too few matches to the rest";
 
 class PhotoMatches {
  public:

@@ -112,7 +112,7 @@ TEST(PhotoMatches, SayWhyPhotosHaveNoPose) {
     reasons += photo.name + ": " + photo.reason + "\n";
   EXPECT_EQ(reasons,
             "p0.jpg: not consistent with the others\n"
-            "p1.jpg: of another place: they match each other, but not the rest\n"
+            "p1.jpg: in another model, of another place or with too few matches to the rest\n"
             "p2.jpg: few features, as of water, sky or a blurred picture\n"
             "p3.jpg: nothing in common with another photo\n"
             "p4.jpg: not decodable\n");

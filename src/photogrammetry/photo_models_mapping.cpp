@@ -72,17 +72,12 @@ bool moveIntoSubfolder(const fs::path& folder) {
 }  // namespace
 
 std::vector<std::string> PhotoModels::mapperArguments(const fs::path& output) const {
-  return {"mapper",
-          "--database_path",
-          (folder_ / "database.db").string(),
-          "--image_path",
-          (folder_ / "images").string(),
-          "--output_path",
-          output.string(),
-          "--Mapper.num_threads",
-          settings_.threadsText(),
-          "--Mapper.min_model_size",
-          "3"};
+  return {"mapper", "--database_path", (folder_ / "database.db").string(), "--image_path",
+          (folder_ / "images").string(), "--output_path", output.string(), "--Mapper.num_threads",
+          settings_.threadsText(), "--Mapper.min_model_size", "3",
+          // All poses are adjusted less often than by default; the stage `adjusting` does it in the end.
+          "--Mapper.ba_global_function_tolerance", "1e-6", "--Mapper.ba_global_images_ratio", "1.2",
+          "--Mapper.ba_global_points_ratio", "1.2", "--Mapper.ba_global_max_refinements", "2"};
 }
 
 void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch) {
@@ -100,11 +95,8 @@ void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool 
   makeFolder(output);
   makeFolder(snapshots);
   std::vector<std::string> arguments = mapperArguments(output);
-  arguments.insert(arguments.end(),
-                   {"--Mapper.init_min_tri_angle", "8", "--Mapper.ba_global_function_tolerance", "1e-6",
-                    "--Mapper.ba_global_images_ratio", "1.2", "--Mapper.ba_global_points_ratio", "1.2",
-                    "--Mapper.ba_global_max_refinements", "2", "--Mapper.snapshot_path", snapshots.string(),
-                    "--Mapper.snapshot_images_freq", std::to_string(kPhotosPerSnapshot)});
+  arguments.insert(arguments.end(), {"--Mapper.init_min_tri_angle", "8", "--Mapper.snapshot_path", snapshots.string(),
+                                     "--Mapper.snapshot_images_freq", std::to_string(kPhotosPerSnapshot)});
   const fs::path from = photosIn(begun).empty() ? input : begun;
   if (!from.empty()) arguments.insert(arguments.end(), {"--input_path", from.string()});
   runColmap("mapping", std::move(arguments), [&] {
@@ -195,7 +187,9 @@ void PhotoModels::mapRest(const fs::path& models, bool withNeighbours, const Wat
 }
 
 void PhotoModels::mapLinked(const fs::path& models, const Watch& watch) {
-  constexpr size_t kLinks = 3, kShareOfMany = 10, kAttempts = 4;
+  constexpr size_t kLinks = 3, kShareOfMany = 10;
+  // Pairs with many inliers may be of photos from nearly one place, which begin no model: these are soon tried.
+  constexpr size_t kMaxModels = 4, kMaxPairs = 12;
   const std::vector<Piece> pieces = piecesIn(models);
   if (!isSupported(pieces[0])) return;
   const std::set<int> missing = notIn(pieces);
@@ -220,8 +214,11 @@ void PhotoModels::mapLinked(const fs::path& models, const Watch& watch) {
     return static_cast<size_t>(std::count_if(some.begin(), some.end(), [&](int p) { return all.contains(p); }));
   };
   bool succeeded = false;
-  for (size_t i = 0; i < std::min(kAttempts, beginnings.size()) && !succeeded; ++i) {
-    for (const Piece& piece : mapOnly(models, photos, {.pair = beginnings[i].second}, watch)) {
+  size_t begun = 0;
+  for (size_t i = 0; i < std::min(kMaxPairs, beginnings.size()) && begun < kMaxModels && !succeeded; ++i) {
+    const std::vector<Piece> added = mapOnly(models, photos, {.pair = beginnings[i].second}, watch);
+    begun += added.empty() ? 0 : 1;
+    for (const Piece& piece : added) {
       // It must be the new largest one, or be possible to join with that.
       const bool isUseful =
           isSupported(piece) && 2 * countIn(linked, piece.photos) > linked.size() &&

@@ -8,6 +8,7 @@
 
 #include "base/child_process.h"
 #include "base/error.h"
+#include "base/file_digest.h"
 #include "base/image_io.h"
 #include "base/log.h"
 #include "base/output_pipe.h"
@@ -123,9 +124,7 @@ std::string VideoFrames::frameFile(int64_t frame) const {
 }
 
 std::string VideoFrames::origin() const {
-  std::error_code status;
-  return fmt::format("{} {} {}", fs::file_size(video_, status),
-                     fs::last_write_time(video_, status).time_since_epoch().count(), options_.count);
+  return fmt::format("{} {}", fileDigest(video_), options_.count);
 }
 
 // With "file:" and an absolute path, no name can be mistaken for an option or a protocol, and a list of files that
@@ -143,9 +142,10 @@ std::vector<std::string> VideoFrames::command(const std::string& program) const 
 VideoStream VideoFrames::inspect(const Watch& watch) {
   std::vector<std::string> arguments = command(options_.probe);
   // V: no cover pictures.
-  arguments.insert(arguments.end(),
-                   {"-select_streams", "V:0", "-show_entries",
-                    "stream=width,height,nb_frames,duration,avg_frame_rate:format=duration", "-of", "json"});
+  arguments.insert(
+      arguments.end(),
+      {"-select_streams", "V:0", "-show_entries",
+       "stream=width,height,nb_frames,duration,avg_frame_rate,color_transfer:format=duration", "-of", "json"});
   OutputPipe pipe;
   ChildProcess process;
   const std::string failure = process.start(arguments, {.output = pipe.writeEnd(), .hasOwnGroup = true});
@@ -160,6 +160,9 @@ VideoStream VideoFrames::inspect(const Watch& watch) {
   }
   const auto stream = parseVideoStream(text);
   if (!stream) throw Error(video_.string(), "", "has no video stream", remedy);
+  if (stream->isHdr)
+    warn("{}: its colours are HDR, which are not converted: the scene will look dull; export it as SDR",
+         video_.string());
   return *stream;
 }
 
@@ -180,6 +183,8 @@ void VideoFrames::choose(const Watch& watch) {
                     "[picture]",
                     "-fps_mode",
                     "passthrough",
+                    "-enc_time_base",  // that of the mean rate would give some frames of phones the same time
+                    "1:1000",
                     "-c:v",
                     "pgm",
                     "-f",

@@ -39,7 +39,7 @@ class VideoFrames {
   // Stores the chosen frames that are not there yet. Throws Error if the program fails.
   void extract(const Watch& watch);
 
-  // What the choice depends on: size and time of the video, and the number asked for.
+  // What the choice depends on: the contents of the video (fileDigest), and the number asked for.
   std::string origin() const;
   bool isComplete() const;  // whether all frames chosen of this origin are there
   void discard() const;     // removes them all, which are of another video or number

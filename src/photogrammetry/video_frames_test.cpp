@@ -120,6 +120,43 @@ TEST_F(VideoFramesOf, AVideoHaveThePlaceThatTheirTimesSay) {
   EXPECT_EQ(files(), "frame_000002.jpg frame_000005.jpg frame_000008.jpg frames.json ");
 }
 
+// As phones film: the frames are less than half of a mean interval apart here and there.
+TEST_F(VideoFramesOf, AVideoOfAVariableRateAreNoDamage) {
+  SKIP_WITHOUT_FFMPEG();
+  const fs::path video = writeVideo("video.mp4", 16,
+                                    {"-vf", "settb=1/90000,setpts='N*5625+mod(N*1237,4000)'", "-fps_mode",
+                                     "passthrough", "-enc_time_base", "1:90000", "-video_track_timescale", "90000"});
+  VideoFrames frames = this->frames(video);
+  testing::internal::CaptureStderr();
+  take(frames);
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_EQ(said.find("reports"), said.npos) << said;
+  EXPECT_EQ(frames.chosen(), 4u);
+}
+
+TEST_F(VideoFramesOf, ACopyOfAVideoAreKept) {
+  SKIP_WITHOUT_FFMPEG();
+  const fs::path video = writeVideo("video.mkv", 16), copy = folder_ / "copy.mkv";
+  VideoFrames frames = this->frames(video);
+  take(frames);
+  fs::copy_file(video, copy);
+  fs::last_write_time(copy, fs::file_time_type());
+  EXPECT_TRUE(this->frames(copy).isComplete());
+  EXPECT_FALSE(this->frames(writeVideo("other.mkv", 15)).isComplete());
+}
+
+TEST_F(VideoFramesOf, AVideoInHdrAreWarnedOf) {
+  SKIP_WITHOUT_FFMPEG();
+  for (const bool isHdr : {true, false}) {
+    VideoFrames frames =
+        this->frames(writeVideo(isHdr ? "hdr.mp4" : "sdr.mp4", 4, {"-color_trc", isHdr ? "arib-std-b67" : "bt709"}));
+    testing::internal::CaptureStderr();
+    frames.inspect([](int64_t) {});
+    const std::string said = testing::internal::GetCapturedStderr();
+    EXPECT_EQ(said.find("its colours are HDR") != said.npos, isHdr) << said;
+  }
+}
+
 TEST_F(VideoFramesOf, AVideoAreTurnedAndHaveSquarePixels) {
   SKIP_WITHOUT_FFMPEG();
   const fs::path video = writeVideo("video.mp4", 4, {"-vf", "setsar=2"});

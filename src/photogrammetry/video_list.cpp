@@ -59,6 +59,8 @@ std::optional<VideoStream> parseVideoStream(std::string_view text) {
   const auto format = json.find("format");
   if (stream.seconds == 0 && format != json.end() && format->is_object()) stream.seconds = secondsIn(*format);
   stream.framesPerSecond = parseRatio(textIn(first, "avg_frame_rate")).value_or(0);
+  const std::string transfer = textIn(first, "color_transfer");
+  stream.isHdr = transfer == "arib-std-b67" || transfer == "smpte2084";
   constexpr double kMaxFrames = 1e12;
   const double frames = static_cast<double>(parseWhole<int64_t>(textIn(first, "nb_frames")).value_or(0));
   const double estimate = frames > 0 ? frames : std::round(stream.seconds * stream.framesPerSecond);

@@ -17,10 +17,12 @@ struct VideoStream {
   int64_t frames = 0;
   double seconds = 0;
   double framesPerSecond = 0;  // the mean
+  bool isHdr = false;          // its brightness is coded as HLG or PQ
 };
 
-// Decodes the JSON of `ffprobe -show_entries stream=width,height,nb_frames,duration,avg_frame_rate:format=duration`:
-// its first stream. Nothing: there is no stream with pictures.
+// Decodes the JSON of `ffprobe -show_entries
+// stream=width,height,nb_frames,duration,avg_frame_rate,color_transfer:format=duration`: its first stream. Nothing:
+// there is no stream with pictures.
 std::optional<VideoStream> parseVideoStream(std::string_view json);
 
 // Decodes the text of the format `framecrc`: the presentation time of each frame in seconds, in the order of the file.

@@ -15,6 +15,18 @@ TEST(VideoList, ReadsWhatFfprobeTells) {
   EXPECT_EQ(stream->frames, 600);
   EXPECT_DOUBLE_EQ(stream->seconds, 20.02);
   EXPECT_NEAR(stream->framesPerSecond, 29.97, 0.01);
+  EXPECT_FALSE(stream->isHdr);
+}
+
+TEST(VideoList, TellsHdr) {
+  const auto isHdr = [](const std::string& transfer) {
+    const auto stream =
+        parseVideoStream(R"({"streams": [{"width": 8, "height": 8, "color_transfer": ")" + transfer + R"("}]})");
+    return stream && stream->isHdr;
+  };
+  EXPECT_TRUE(isHdr("arib-std-b67"));
+  EXPECT_TRUE(isHdr("smpte2084"));
+  EXPECT_FALSE(isHdr("bt709"));
 }
 
 TEST(VideoList, EstimatesWhatTheContainerDoesNotTell) {

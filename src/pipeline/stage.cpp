@@ -209,7 +209,12 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
   const auto record = [&run](const StageNeeds& total) {
     run["expected"] = {{"seconds", total.seconds}, {"peak_bytes", total.memoryBytes}, {"disk_bytes", total.diskBytes}};
   };
-  record(planRemaining(stages, remaining).total());
+  // Of the whole run: what is done counts as it took.
+  RunPlan plan = planRemaining(stages, remaining);
+  std::vector<Record> done = remaining.known;
+  if (remaining.interrupted) done.push_back(*remaining.interrupted);
+  for (const Record& before : done) plan.entries.push_back({"", {before.seconds, before.peakBytes, 0}});
+  record(plan.total());
   for (size_t i = 0; i < remaining.first; ++i) {
     fmt::print("{:<10} finished before: {}\n", stages[i].name, remaining.known[i].summary);
     run["stages"].push_back(toJson(stages[i].name, remaining.known[i]));

@@ -74,10 +74,10 @@ struct RunRequest {
 };
 
 // Runs the stages in order, and prints a line for each on stdout, with the time that those after it will take. run.json
-// records what they were expected to take, all before the first one runs, and each when it begins. What interrupted
-// attempts at a stage took is added to its record, unless they were killed. Throws Error if a stage of `range` does not
-// exist or the last one precedes the first, and what a stage or `check` throws, which is called before each stage that
-// runs.
+// records what they were expected to take, all before the first one runs (of finished stages, what they took), and each
+// when it begins. What interrupted attempts at a stage took is added to its record, unless they were killed. Throws
+// Error if a stage of `range` does not exist or the last one precedes the first, and what a stage or `check` throws,
+// which is called before each stage that runs.
 void runStages(
     const fs::path& folder, const RunRequest& request, const std::vector<Stage>& stages, const StageRange& range,
     const std::function<void()>& check = [] {});

@@ -114,7 +114,8 @@ GpsFix gpsAt(const GeographicLib::LocalCartesian& earth, const CityOptions& o, c
   GpsFix fix;
   earth.Reverse(at.x() + noise(o.gpsNoise, 0), at.y() + noise(o.gpsNoise, 1),
                 at.z() + noise(o.gpsHeightNoise, 2) + tooHigh, fix.latitude, fix.longitude, fix.altitude);
-  fix.relativeAltitude = at.z() - ground + tooHigh;
+  // As drones do, it adds its height above take-off to that of the take-off to get the altitude.
+  fix.relativeAltitude = at.z() - ground + noise(o.gpsHeightNoise, 2) + tooHigh;
   return fix;
 }
 

@@ -17,11 +17,11 @@ struct ModelManifest {
   std::string method;
   int64_t step = 0;          // steps done
   int64_t plannedSteps = 0;  // 0 while it is not yet known, with `--minutes`
+  // Checkpoints, relative to the folder, one per block; manifests of a model that consists of models.
+  std::vector<std::string> files;
   // Of the steps done, while it is not yet known how many are planned; of these seconds, those that went into
   // checkpoints.
   double seconds = 0, savingSeconds = 0;
-  // Checkpoints, relative to the folder, one per block; manifests of a model that consists of models.
-  std::vector<std::string> files;
 };
 
 // The number of steps that was derived from `--minutes`. The steps before `plannedAtStep` were done without knowing it,
