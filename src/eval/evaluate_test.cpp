@@ -168,7 +168,11 @@ TEST(Evaluate, AppliesTheGainThatAPhotosExposurePredicts) {
   const EvaluationReport report = evaluate(renderer, fake.capture, options);
   for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(report.views[0].gain[c], gain[c], 1e-5);
   EXPECT_GT(report.psnr, 90);
-  EXPECT_NE(toJson(report).find("predicted from EXIF"), std::string::npos);
+  EXPECT_NE(toJson(report).find("\"predicted from EXIF\""), std::string::npos);
+  // A photo without these tags is compared as it is rendered.
+  fake.add("b", photo);
+  FakeRenderer both({dark, dark});
+  EXPECT_EQ(describeExposures(evaluate(both, fake.capture, options)), "predicted from EXIF for 1 of 2 views");
 }
 
 TEST(Evaluate, ComparesTheRightHalvesAloneIfAskedTo) {

@@ -1,3 +1,7 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -52,8 +56,14 @@ std::optional<Exposures> exposuresFromName(std::string_view name) {
 
 std::string describeExposures(const EvaluationReport& report) {
   if (report.exposures == Exposures::fitted) return "fitted on the left half, judged on the right";
-  return std::string(report.exposures == Exposures::predicted ? "predicted from EXIF" : "neutral") +
-         (report.rightHalves ? ", judged on the right half" : "");
+  std::string how = report.exposures == Exposures::predicted ? "predicted from EXIF" : "neutral";
+  // Photos without these tags have the gain 1.
+  const auto predicted = std::count_if(report.views.begin(), report.views.end(), [](const ViewResult& view) {
+    return view.gain != std::array<double, 3>{1, 1, 1};
+  });
+  if (report.exposures == Exposures::predicted && predicted < std::ssize(report.views))
+    how += fmt::format(" for {} of {} views", predicted, report.views.size());
+  return how + (report.rightHalves ? ", judged on the right half" : "");
 }
 
 std::string toJson(const EvaluationReport& report) {
