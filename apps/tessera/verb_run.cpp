@@ -11,6 +11,7 @@
 #include "pipeline/photo_run.h"
 #include "pipeline/run_request.h"
 #include "representations/methods.h"
+#include "train/method_costs.h"
 
 namespace tessera {
 namespace {
@@ -24,8 +25,7 @@ std::vector<std::string> bakedMethods() {
 
 // An H200 trains 28 to 40 times the rays of MethodCosts::raysPerSecond in the same time, which depends on the method;
 // smaller GPUs are taken to train ten times as many.
-TrainingCosts typicalCosts(const std::string& method, bool onGpu) {
-  const MethodCosts costs = findMethod(method)->costs;
+TrainingCosts typicalCosts(const MethodCosts& costs, bool onGpu) {
   const double speed = onGpu ? 10 : 1;
   return {.secondsPerStep = costs.secondsPerStep / speed,
           .raysPerSecond = costs.raysPerSecond * speed,
@@ -33,7 +33,8 @@ TrainingCosts typicalCosts(const std::string& method, bool onGpu) {
           .secondsPerBakedMegapixel = costs.secondsPerBakedMegapixel,
           .secondsPerRenderedMegapixel = costs.secondsPerRenderedMegapixel,
           .trainBytes = costs.trainBytes,
-          .modelBytes = costs.modelBytes};
+          .modelBytes = costs.modelBytes,
+          .coarserLevels = costs.coarserLevels};
 }
 
 // The flags of the command line, whether their values are the defaults or not.
@@ -118,9 +119,16 @@ void addRunVerb(CLI::App& app) {
       throw Error((options->out / "run.json").string(), "flags", "there is no method " + options->method,
                   "give --method");
     device->kind = options->device;
-    if (device->kind != "cpu") makeDevice(*device);  // throws if there is none, before hours are spent
+    uint64_t gpuBytes = 0;
+    // Throws if there is none, before hours are spent.
+    if (device->kind != "cpu") gpuBytes = makeDevice(*device)->ownMemory().bytes;
     options->program = fs::read_symlink("/proc/self/exe").string();
-    options->costs = typicalCosts(options->method, parseVulkanDevice(options->device).has_value());
+    const Method& method = *findMethod(options->method);
+    const bool onGpu = parseVulkanDevice(options->device).has_value();
+    options->costs = typicalCosts(method.costs, onGpu);
+    options->costsOnCapture = [&method, onGpu, gpuBytes](const Capture& capture) {
+      return typicalCosts(costsOnCapture(method, capture, gpuBytes), onGpu);
+    };
     options->interrupted = interrupted;
     catchInterrupts();
     try {

@@ -22,15 +22,21 @@ bool Partition::isThin(int cell) const {
   return match != thin.end() && match->cell == cell;
 }
 
+Site findSite(const Capture& capture) {
+  Site site;
+  site.ground = findGround(capture);
+  site.region = findRegion(capture, site.ground);
+  site.heights = findHeights(capture, site.ground, site.region);
+  return site;
+}
+
 Partition partitionCapture(const Capture& capture, const PartitionOptions& options) {
   if (capture.photosIn(Split::train).empty()) {
     throw Error(capture.root.string(), "", "has no training photos to cut blocks from",
                 "import it again with another --holdout");
   }
   Partition partition;
-  partition.ground = findGround(capture);
-  partition.region = findRegion(capture, partition.ground);
-  partition.heights = findHeights(capture, partition.ground, partition.region);
+  static_cast<Site&>(partition) = findSite(capture);
   const BlockLayout layout = options.grid ? givenLayout(*options.grid)
                                           : layOutBlocks(partition.ground, partition.region, partition.heights,
                                                          options.blocks, options.limits);

@@ -16,11 +16,18 @@ struct PartitionOptions {
   DepthOf findRayDepth;  // optional: the lengths of rays; see coverage.h
 };
 
-struct Partition {
-  BlockGrid grid;
+// What is divided into blocks.
+struct Site {
   Ground ground;
   Region region;
   Heights heights;
+};
+
+// Finds it by the same data as partitionCapture, which takes longer. The capture must have training photos.
+Site findSite(const Capture& capture);
+
+struct Partition : Site {
+  BlockGrid grid;
   DecidedBy decidedBy = DecidedBy::request;
   std::vector<CellCoverage> coverage;  // one entry per cell
   std::vector<ThinCell> thin;          // cells to warn about before training, in order of cell

@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "base/child_process.h"
 #include "base/error.h"
 #include "base/file_digest.h"
 #include "base/log.h"
@@ -15,12 +15,12 @@
 #include "import/capture_reader.h"
 #include "import/georeference.h"
 #include "import/importer.h"
+#include "photogrammetry/photo_footprints.h"
 #include "photogrammetry/photo_list.h"
 #include "photogrammetry/photo_masks.h"
 #include "photogrammetry/photo_matches.h"
 #include "photogrammetry/photo_models.h"
 #include "photogrammetry/photo_pairs.h"
-#include "pipeline/echoed_line.h"
 #include "pipeline/folder_lock.h"
 #include "pipeline/frames_stage.h"
 #include "pipeline/georeference_json.h"
@@ -31,6 +31,7 @@
 #include "pipeline/run_report.h"
 #include "pipeline/run_request.h"
 #include "pipeline/training_progress.h"
+#include "pipeline/verb_process.h"
 
 namespace tessera {
 namespace {
@@ -108,13 +109,21 @@ class PhotoRun {
                return has("capture/transforms.json")() &&
                       (!posed_ || (has("poses/left_out.json")() && has("poses/georeference.json")()));
              },
-         .needs = [this](bool) { return trainingNeeds().capture; },
+         .needs =
+             [this](bool) {
+               isCaptureKept_ = false;
+               return trainingNeeds().capture;
+             },
          .run = [this](bool) { return capture(); }},
         {.name = "train",
          .settings = fmt::format("--method {} {}", options_.method, training),
          .isComplete = has("model/manifest.json"),
          .discard = [this] { setModelAside(); },
-         .needs = [this](bool resumes) { return withoutDone(trainingNeeds().train, resumes ? shareTrained() : 0); },
+         .needs =
+             [this](bool resumes) {
+               isModelKept_ = false;
+               return withoutDone(trainingNeeds().train, resumes ? shareTrained() : 0);
+             },
          .run = [this](bool) { return train(); }},
         {.name = "bake",
          .settings = "",
@@ -347,40 +356,12 @@ class PhotoRun {
                                           .threads = options_.threads,
                                           .look = [this] { stopIfInterrupted(); },
                                           .dropped = [&](const std::set<std::string>& names) { dropped = names; }});
+    isCaptureKept_ = true;
+    costs_.reset();
     addLeftOut(leftOutFile(), dropped, "damaged: it ends early, or cannot be decoded");
     const std::string size = downscale() > 1 ? fmt::format(", made smaller by {}", downscale()) : "";
     return {0, fmt::format("{} photos, {} held out{}{}", capture.photos.size(), capture.photosIn(Split::test).size(),
                            capture.geo ? ", georeferenced" : "", size)};
-  }
-
-  // Runs a verb of this program; its messages are in logs/VERB.log, and the last one is shown meanwhile.
-  StageOutcome runVerb(const std::string& verb, std::vector<std::string> arguments) {
-    const fs::path log = options_.out / "logs" / (verb + ".log");
-    arguments.insert(arguments.begin(), {options_.program, verb, "--device", options_.device});
-    if (options_.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(options_.threads)});
-    ChildProcess process;
-    const std::string failure = process.start(arguments, {.log = log, .hasOwnGroup = true});
-    if (!failure.empty()) throw Error(options_.program, "", "cannot be run: " + failure, "install it again");
-    const auto lastLine = [&process] {
-      const std::string words = process.lastWords();
-      return words.substr(words.rfind('\n') == words.npos ? 0 : words.rfind('\n') + 1);
-    };
-    EchoedLine echo;
-    // It is interrupted in its own way: training writes a checkpoint.
-    constexpr double kSecondsBetweenLooks = 0.2;
-    for (bool asked = false; !process.waitFor(kSecondsBetweenLooks);) {
-      echo.show(lastLine());
-      if (asked || !options_.interrupted()) continue;
-      process.interrupt();
-      asked = true;
-    }
-    echo.clear();
-    const std::string end = process.wait();
-    if (!end.empty()) {
-      stopIfInterrupted();
-      throw Error("tessera " + verb, "", end + ": " + lastLine(), "see " + log.string() + "; run again to go on");
-    }
-    return {process.peakBytes(), lastLine()};
   }
 
   // How much of the training the model has behind it.
@@ -410,17 +391,21 @@ class PhotoRun {
       arguments.insert(arguments.end(), {"--minutes", fmt::format("{}", options_.minutes)});
     }
     inform("to watch the training: tail -f {}", (options_.out / "logs" / "train.log").string());
-    return runVerb("train", arguments);
+    const StageOutcome outcome = runVerb(options_, "train", arguments);
+    isModelKept_ = true;
+    return outcome;
   }
 
   StageOutcome bake() {
-    return runVerb("bake", {out("model").string(), out("scene").string(), "--capture", out("capture").string()});
+    return runVerb(options_, "bake",
+                   {out("model").string(), out("scene").string(), "--capture", out("capture").string()});
   }
 
   StageOutcome evaluate() {
     if (!hasHoldOut()) return {0, "no photo is held out"};
-    StageOutcome outcome = runVerb("eval", {out("scene").string(), out("capture").string(), "--json",
-                                            out("eval.json").string(), "--report", out("evaluation.html").string()});
+    StageOutcome outcome = runVerb(options_, "eval",
+                                   {out("scene").string(), out("capture").string(), "--json", out("eval.json").string(),
+                                    "--report", out("evaluation.html").string()});
     const auto result = nlohmann::json::parse(readTextFile(out("eval.json")));
     // It has none if the views show nothing that is compared.
     outcome.summary = result.is_object() && result.contains("psnr") && result["psnr"].is_number()
@@ -443,8 +428,34 @@ class PhotoRun {
     return {0, out("report.html").string()};
   }
 
+  // The capture that is there unless it will be made anew, else what is known of it beforehand.
+  std::optional<Capture> expectedCapture() const {
+    if (isCaptureKept_ && has("capture/transforms.json")()) return readCapture(out("capture"));
+    std::optional<Capture> capture = posed_ ? posed_->capture() : captureFromTags(list_);
+    if (!capture) return capture;
+    // Heights by tags are not precise: rather more blocks than fewer.
+    constexpr double kFiner = 1.1;
+    const double factor = (posed_ ? 1 : kFiner) / downscale();
+    const auto side = [factor](int pixels) { return std::max(1, static_cast<int>(std::lround(factor * pixels))); };
+    for (Camera& camera : capture->cameras) camera = camera.scaledTo(side(camera.width), side(camera.height));
+    return capture;
+  }
+
+  const TrainingCosts& costs() {
+    if (costs_) return *costs_;
+    costs_ = options_.costs;
+    if (!options_.costsOnCapture) return *costs_;
+    try {
+      if (const auto capture = expectedCapture()) costs_ = options_.costsOnCapture(*capture);
+    } catch (const Error&) {  // damaged: it will be written again, or training says so
+    }
+    return *costs_;
+  }
+
   TrainingNeeds trainingNeeds() {
-    return posed_ ? posed_->trainingNeeds(downscale()) : estimator_->trainingNeeds(downscale());
+    TrainingSize size = posed_ ? posed_->trainingSize(downscale()) : estimator_->trainingSize(downscale());
+    if (isModelKept_) size.raysPerSecond = readRaysPerSecond(out("model"));
+    return planTraining(size, costs());
   }
 
   PhotoRunOptions options_;
@@ -456,6 +467,8 @@ class PhotoRun {
   std::unique_ptr<PhotoMatches> matches_;
   std::unique_ptr<PhotoModels> models_;
   std::unique_ptr<RunEstimator> estimator_;
+  bool isCaptureKept_ = true, isModelKept_ = true;  // until the plan asks what new ones take
+  std::optional<TrainingCosts> costs_;
 };
 
 }  // namespace

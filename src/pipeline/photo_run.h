@@ -22,6 +22,7 @@
 #include "base/file.h"
 #include "pipeline/run_plan.h"
 #include "pipeline/stage.h"
+#include "scene/capture.h"
 
 namespace tessera {
 
@@ -37,8 +38,10 @@ struct PhotoRunOptions {
   std::string device = "cpu";    // of training, baking and evaluating: DeviceOptions::kind
   int threads = 0;               // 0: all
   std::string program;           // this program, which trains, bakes and evaluates
-  TrainingCosts costs;           // of `method`
-  bool dryRun = false;           // prints what the run will take, and ends
+  TrainingCosts costs;           // of `method`, for one block
+  // Returns those for the blocks of a capture. Its photos are not read. Empty: they are `costs`.
+  std::function<TrainingCosts(const Capture&)> costsOnCapture;
+  bool dryRun = false;  // prints what the run will take, and ends
   StageRange range;
   std::function<bool()> interrupted = [] { return false; };  // asked for now and then; stops the run
 };

@@ -14,6 +14,7 @@
 #include "import/georeference.h"
 #include "import/holdout.h"
 #include "import/importer.h"
+#include "import/orient_world.h"
 #include "photogrammetry/photo_masks.h"
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
@@ -136,12 +137,18 @@ SourceCapture PosedSource::take(const fs::path& poses) {
   return std::move(source_);
 }
 
-TrainingNeeds PosedSource::trainingNeeds(int downscale) const {
+TrainingSize PosedSource::trainingSize(int downscale) const {
   TrainingSize size = size_;
   size.photoPixels /= int64_t{downscale} * downscale;
   size.threads = options_->threads;
   size.isLinked = downscale == 1 && areOnOneDisk(options_->photos, options_->out);
-  return planTraining(size, options_->costs);
+  return size;
+}
+
+Capture PosedSource::capture() const {
+  SourceCapture copy = source_;
+  if (!copy.capture.photos.empty()) orientWorld(copy, {});
+  return std::move(copy.capture);
 }
 
 }  // namespace tessera

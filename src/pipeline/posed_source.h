@@ -27,7 +27,8 @@ class PosedSource {
   // How large the capture is if its photos keep their size; where a photo cannot be read, its camera tells it.
   const TrainingSize& trainingSize() const { return size_; }
   bool holdsOut() const { return size_.heldOut > 0; }  // whether photos are held out, if none is dropped at import
-  TrainingNeeds trainingNeeds(int downscale) const;
+  TrainingSize trainingSize(int downscale) const;      // in the folder of the run
+  Capture capture() const;                             // until it is taken: with Z up, as import would turn it
 
  private:
   explicit PosedSource(const PhotoRunOptions& options);

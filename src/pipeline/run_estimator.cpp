@@ -96,13 +96,13 @@ const TrainingSize& RunEstimator::trainingSize() {
   return *trainingSize_;
 }
 
-TrainingNeeds RunEstimator::trainingNeeds(int downscale) {
+TrainingSize RunEstimator::trainingSize(int downscale) {
   TrainingSize size = trainingSize();
   size.photoPixels /= int64_t{downscale} * downscale;
   size.relativeSeconds = relativeSeconds(rates());
   size.threads = options_.threads;
   size.isLinked = downscale == 1 && areOnOneDisk(list_.photos.front().file, options_.out);
-  return planTraining(size, options_.costs);
+  return size;
 }
 
 int RunEstimator::threads() const {

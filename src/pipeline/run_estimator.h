@@ -22,13 +22,14 @@ class RunEstimator {
   MatchingNeeds matchingNeeds();
   StageNeeds featureNeeds(bool resumes);
   StageNeeds matchNeeds(bool resumes);
-  TrainingNeeds trainingNeeds(int downscale);
 
   // From now on, the number of pairs is known.
   void setPairs(size_t pairs) { expectedPairs_ = static_cast<int64_t>(pairs); }
 
   // How large the capture is if its photos keep their size. Throws Error as holdOut does.
   const TrainingSize& trainingSize();
+  // How large it is in the folder of the run, on this machine, whose rates are measured when this is first called.
+  TrainingSize trainingSize(int downscale);
 
  private:
   const MatchingRates& rates();

@@ -191,12 +191,14 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
   const double training = size.steps > 0 ? static_cast<double>(size.steps) * costs.secondsPerStep * speed
                                          : kSecondsPerMinute * size.minutes;
   needs.train = {
-      training + kStartAndEnd,
+      training * (1 + costs.coarserLevels) + kStartAndEnd,
       costs.trainBytes + static_cast<int64_t>(std::min(kBytesPerPixel * pixels * (photos - heldOut),
                                                        kMaxPhotoShare * static_cast<double>(usableMemoryBytes()))),
       costs.modelBytes};
+  // What makes rays slow in training, as fog and leaves do, makes baking slow as well.
+  const double bakingSpeed = size.raysPerSecond > 0 ? costs.raysPerSecond / size.raysPerSecond : speed;
   needs.bake = {kStartAndEnd + costs.bakeSeconds * speed +
-                    (photos - heldOut) * pixels * 1e-6 * costs.secondsPerBakedMegapixel * speed,
+                    (photos - heldOut) * pixels * 1e-6 * costs.secondsPerBakedMegapixel * bakingSpeed,
                 costs.trainBytes / 2, 0};
   if (size.heldOut > 0)
     needs.evaluate = {kStartAndEnd + heldOut * pixels * 1e-6 * costs.secondsPerRenderedMegapixel * speed,

@@ -51,15 +51,16 @@ struct MatchingNeeds {
 MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates);
 
 // What a representation costs to train, bake and evaluate on two cores, by order of magnitude: measured on small
-// scenes.
+// scenes, and for the blocks into which training divides a capture.
 struct TrainingCosts {
   double secondsPerStep = 0.2;
   double raysPerSecond = 20000;
   double bakeSeconds = 20;                 // whatever the photos, and
-  double secondsPerBakedMegapixel = 1;     // of the training photos
+  double secondsPerBakedMegapixel = 1;     // of the training photos, if training has as many rays a second as above
   double secondsPerRenderedMegapixel = 1;  // of the photos held out
   int64_t trainBytes = 0;                  // of memory, besides the photos
   int64_t modelBytes = 0;                  // on disk, the scene included
+  double coarserLevels = 0;                // time for coarser levels of detail after the finest, as a share of its time
 };
 
 // How large the capture is that a model is trained on.
@@ -72,6 +73,7 @@ struct TrainingSize {
   double minutes = 0;          // of training; or
   int64_t steps = 0;           // steps, if above 0
   double relativeSeconds = 1;  // that this machine takes for what takes two cores one
+  double raysPerSecond = 0;    // that training has had on this capture; 0: not known yet
   int threads = 0;             // of the import; 0: all
   bool isLinked = false;       // whether the capture links the photos instead of copying them
 };

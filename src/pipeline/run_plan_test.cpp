@@ -107,6 +107,22 @@ TEST(RunPlan, GrowsWithPhotosAndMinutes) {
   EXPECT_EQ(planTraining(size, costs).evaluate.seconds, 0);
 }
 
+TEST(RunPlan, AddsTheCoarserLevelsToTheMinutes) {
+  TrainingCosts costs{.secondsPerStep = 0.1};
+  const TrainingSize size{.photos = 100, .heldOut = 20, .photoPixels = 1000 * 1000, .minutes = 10};
+  const double alone = planTraining(size, costs).train.seconds;
+  costs.coarserLevels = 0.5;
+  EXPECT_NEAR(planTraining(size, costs).train.seconds, alone + 300, 1e-6);
+}
+
+TEST(RunPlan, ExpectsBakingToBeAsSlowAsTrainingWas) {
+  const TrainingCosts costs{.raysPerSecond = 10000, .bakeSeconds = 0, .secondsPerBakedMegapixel = 20};
+  TrainingSize size{.photos = 100, .heldOut = 20, .photoPixels = 1000 * 1000, .minutes = 10, .relativeSeconds = 2};
+  EXPECT_NEAR(planTraining(size, costs).bake.seconds, 2 * 1600, 10) << "on a machine of half the speed";
+  size.raysPerSecond = 2500;
+  EXPECT_NEAR(planTraining(size, costs).bake.seconds, 4 * 1600, 10);
+}
+
 TEST(RunPlan, MakesPhotosAsSmallAsTheTrainingOfAllTheirPixelsAsksFor) {
   TrainingCosts costs{.secondsPerStep = 0.1, .raysPerSecond = 30000};
   TrainingSize size{.photos = 18, .heldOut = 3, .sourcePixels = 1600 * 900, .longerSide = 1600, .minutes = 10};

@@ -11,10 +11,19 @@
 namespace tessera {
 namespace {
 
+constexpr std::string_view kListOfHeldOut = "list:";  // of --holdout
+
+// So that it is found from any folder.
+std::string absolutePath(const fs::path& path) {
+  return fs::absolute(path).lexically_normal().string();
+}
+
 // The flags that the results depend on. Those whose value is the default of nothing are left out.
 std::map<std::string, std::string> describeFlags(const PhotoRunOptions& options) {
   std::map<std::string, std::string> flags = {
       {"--method", options.method}, {"--device", options.device}, {"--holdout", options.holdout}};
+  if (options.holdout.starts_with(kListOfHeldOut))
+    flags["--holdout"] = std::string(kListOfHeldOut) + absolutePath(options.holdout.substr(kListOfHeldOut.size()));
   if (options.steps > 0) {
     flags["--steps"] = std::to_string(options.steps);
   } else {
@@ -22,7 +31,7 @@ std::map<std::string, std::string> describeFlags(const PhotoRunOptions& options)
   }
   if (options.downscale > 0) flags["--downscale"] = std::to_string(options.downscale);
   if (options.frames > 0) flags["--frames"] = std::to_string(options.frames);
-  if (!options.masks.empty()) flags["--masks"] = fs::absolute(options.masks).lexically_normal().string();
+  if (!options.masks.empty()) flags["--masks"] = absolutePath(options.masks);
   return flags;
 }
 

@@ -46,11 +46,26 @@ TEST_F(RunRequests, KeepTheFlagsOfTheRunBefore) {
   EXPECT_EQ(now.steps, 0);
   EXPECT_EQ(now.downscale, 4);
   EXPECT_EQ(now.frames, 70);
-  EXPECT_EQ(now.holdout, "list:a b.txt");
+  EXPECT_EQ(now.holdout, "list:" + fs::absolute("a b.txt").string()) << "from another folder, too";
   EXPECT_EQ(now.device, "vulkan:1");
-  EXPECT_EQ(now.masks, fs::absolute("masks")) << "from another folder, too";
+  EXPECT_EQ(now.masks, fs::absolute("masks"));
   runWith(now);
   EXPECT_EQ(adopt({}).minutes, 0.3) << "however often it is run";
+}
+
+TEST_F(RunRequests, AreKeptOfACallThatFindsEverythingDone) {
+  const Stage stage{.name = "one", .run = [](bool) { return StageOutcome{0, "done"}; }};
+  PhotoRunOptions options = options_;
+  options.masks = "masks";
+  runStages(folder_.path(), describeRequest(options), {stage}, {});
+  const auto before = readStageRecords(folder_.path());
+  options.masks.clear();
+  runStages(folder_.path(), describeRequest(options), {stage}, {});
+  EXPECT_TRUE(adopt({}).masks.empty());
+  const auto after = readStageRecords(folder_.path());
+  ASSERT_EQ(after.size(), 1u);
+  EXPECT_EQ(after[0].summary, "done");
+  EXPECT_EQ(after[0].seconds, before[0].seconds);
 }
 
 TEST_F(RunRequests, PreferTheFlagsThatAreGiven) {

@@ -215,6 +215,14 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
   if (remaining.interrupted) done.push_back(*remaining.interrupted);
   for (const Record& before : done) plan.entries.push_back({"", {before.seconds, before.peakBytes, 0}});
   record(plan.total());
+  if (remaining.first == remaining.end) {  // the next call without flags is for those of this one all the same
+    Json before = readRun(file);
+    if (before.is_object()) {
+      before["request"] = request.command;
+      before["flags"] = request.flags;
+      write(before, file);
+    }
+  }
   for (size_t i = 0; i < remaining.first; ++i) {
     fmt::print("{:<10} finished before: {}\n", stages[i].name, remaining.known[i].summary);
     run["stages"].push_back(toJson(stages[i].name, remaining.known[i]));

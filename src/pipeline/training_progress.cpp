@@ -1,7 +1,12 @@
 #include "pipeline/training_progress.h"
 
 #include <algorithm>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "base/order_statistics.h"
 
 namespace tessera {
 
@@ -16,6 +21,23 @@ TrainingProgress readTrainingProgress(const fs::path& model) {
     return isNumber ? std::clamp(manifest[key].get<double>(), 0.0, kMax) : 0.0;
   };
   return {static_cast<int64_t>(number("step")), static_cast<int64_t>(number("planned_steps")), number("seconds")};
+}
+
+double readRaysPerSecond(const fs::path& model) {
+  constexpr int64_t kTail = 1 << 14;
+  constexpr size_t kLastLines = 5;
+  std::ifstream file(model / "metrics.jsonl", std::ios::binary | std::ios::ate);
+  if (!file) return 0;
+  file.seekg(std::max<int64_t>(0, static_cast<int64_t>(file.tellg()) - kTail));
+  std::vector<double> rates;
+  for (std::string line; std::getline(file, line);) {  // the first one may lack its beginning
+    const auto metrics = nlohmann::json::parse(line, nullptr, false);
+    if (!metrics.is_object() || !metrics.contains("rays_per_second")) continue;
+    const auto& rate = metrics["rays_per_second"];
+    if (rate.is_number() && rate.get<double>() > 0) rates.push_back(rate.get<double>());
+  }
+  if (rates.size() > kLastLines) rates.erase(rates.begin(), rates.end() - kLastLines);
+  return rates.empty() ? 0 : upperMedian(rates);
 }
 
 }  // namespace tessera

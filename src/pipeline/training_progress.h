@@ -16,4 +16,7 @@ struct TrainingProgress {
 // Returns what manifest.json of a model says; zeros if it is missing or damaged.
 TrainingProgress readTrainingProgress(const fs::path& model);
 
+// Returns how many rays were trained in a second in the end, by the last lines of metrics.jsonl; 0 if it says nothing.
+double readRaysPerSecond(const fs::path& model);
+
 }  // namespace tessera

@@ -25,5 +25,21 @@ TEST(TrainingProgresses, AreThoseOfTheManifest) {
   }
 }
 
+TEST(RaysPerSecond, AreThoseOfTheLastLines) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(readRaysPerSecond(folder.path()), 0);
+  std::string lines;
+  for (int i = 1; i <= 1000; ++i) lines += R"({"step": 1, "rays_per_second": )" + std::to_string(10 * i) + "}\n";
+  lines += R"({"rays_per_second": 1e9})"
+           "\n";  // of a window in which little was done
+  writeFileAtomically(folder / "metrics.jsonl", lines);
+  EXPECT_EQ(readRaysPerSecond(folder.path()), 9990);
+  for (const char* damaged :
+       {"", "{\n[", R"({"rays_per_second": "x"})", R"({"rays_per_second": -1})", "{\"step\": 1}\n{"}) {
+    writeFileAtomically(folder / "metrics.jsonl", std::string(damaged));
+    EXPECT_EQ(readRaysPerSecond(folder.path()), 0) << damaged;
+  }
+}
+
 }  // namespace
 }  // namespace tessera

@@ -48,6 +48,13 @@ struct BlockRun {
 BlockRun openBlockRun(const Capture& capture, const fs::path& model, const BlockRunOptions& options,
                       const PartitionRequirements& partitionRequirements);
 
+// How training divides a capture into blocks, for costsOnCapture (method_costs.h).
+struct BlockDemand {
+  BlockLimits limits;
+  double lodStepFraction = 0;                                       // as BlockMethod returns
+  uint32_t (*topLevel)(uint32_t columns, uint32_t rows) = nullptr;  // null: levels take no time of their own
+};
+
 // What all levels of detail of a run are trained on. Holds references only.
 struct BlockTraining {
   Device& device;

@@ -103,8 +103,9 @@ struct BakeParameter {
 };
 using BakeParameters = std::map<std::string, int64_t, std::less<>>;  // by name; given ones and defaults
 
-// What a method costs on a machine of two cores, by order of magnitude: measured on a capture of 15 photos of 400×225,
-// `mesh` on one of 72 photos of 400×300 in four blocks.
+// What a method costs on a machine of two cores if the capture is one block, by order of magnitude: measured on a
+// capture of 15 photos of 400×225, `mesh` on one of 72 photos of 400×300 in four blocks. costsOnCapture
+// (method_costs.h) returns those of several blocks.
 struct MethodCosts {
   double secondsPerStep = 0;
   double raysPerSecond = 0;                // while it trains
@@ -113,6 +114,7 @@ struct MethodCosts {
   double secondsPerRenderedMegapixel = 0;  // on the CPU
   int64_t trainBytes = 0;                  // of memory, besides the photos
   int64_t modelBytes = 0;                  // on disk, the scene included
+  double coarserLevels = 0;                // time for coarser levels of detail after the finest, as a share of its time
 };
 
 // A null function means that the method does not support it.
@@ -135,6 +137,9 @@ struct Method {
   // writes anything if MethodSettings::check rejects `settings`.
   TrainingResult (*train)(Device& device, const Capture& capture, const fs::path& model, const MethodSettings& settings,
                           const BlockRunOptions& options) = nullptr;
+
+  // Returns how such a training would divide a capture that it has not divided before.
+  BlockDemand (*blockDemand)(const MethodSettings& settings, const BlockRunOptions& options) = nullptr;
 
   // Opens the trained model in a folder for rendering. Keeps a reference to `device`. Throws Error if it cannot be
   // read.

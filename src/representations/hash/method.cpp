@@ -13,6 +13,10 @@ TrainingResult train(Device& device, const Capture& capture, const fs::path& mod
   return trainHash(device, capture, model, {options, SettingsOf<HashConfig>::in(settings)});
 }
 
+BlockDemand blockDemand(const MethodSettings& settings, const BlockRunOptions& options) {
+  return hashBlockDemand(SettingsOf<HashConfig>::in(settings), options);
+}
+
 std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
   auto model = loadHashModel(device, folder);
   auto renderer = std::make_unique<HashModelRenderer>(*model);
@@ -64,9 +68,10 @@ const Method& hashMethod() {
       .name = "hash",
       .summary = "hash tables of blocks whose levels are weighed by attention, decoded once a pixel (NGP-RT)",
       .trainsInBlocks = true,
-      .costs = {0.145, 15000, 10, 27, 10, int64_t{1300} << 20, 750000000},
+      .costs = {0.145, 15000, 10, 20, 10, int64_t{1300} << 20, 750000000},
       .settings = makeSettings<HashConfig>,
       .train = train,
+      .blockDemand = blockDemand,
       .openModel = openModel,
       .openBaker = openBaker,
       .bakeParameters = kBakeParameters,

@@ -15,6 +15,10 @@ TrainingResult train(Device& device, const Capture& capture, const fs::path& mod
   return trainMesh(device, capture, model, {options, SettingsOf<MeshConfig>::in(settings)});
 }
 
+BlockDemand blockDemand(const MethodSettings& settings, const BlockRunOptions&) {
+  return meshBlockDemand(SettingsOf<MeshConfig>::in(settings));
+}
+
 std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
   auto mesh = std::make_unique<TrainedMesh>(loadTrainedMesh(device, folder));
   auto renderer = std::make_unique<MeshRenderer>(*mesh);
@@ -56,7 +60,8 @@ std::unique_ptr<Baker> openBaker(Device& device, const fs::path& folder, const B
   settings.fallback = value(kFallback) != 0;
   settings.inferredMaps = value(kMaps) == 1;
   if (settings.patchEdge > 0 && settings.patchEdge < kMinBakedPatchEdge) {
-    throw Error("--texels " + std::to_string(settings.patchEdge), "", "is less than baked patches have", "use 8 or more");
+    throw Error("--texels " + std::to_string(settings.patchEdge), "", "is less than baked patches have",
+                "use 8 or more");
   }
   if (settings.tilesPerBlock > 0 && !std::has_single_bit(settings.tilesPerBlock)) {
     throw Error("--tiles-per-block " + std::to_string(settings.tilesPerBlock), "", "is not a power of two",
@@ -83,9 +88,10 @@ const Method& meshMethod() {
       .summary = "triangles whose colours a small network decodes (UE4-NeRF)",
       .trainsInBlocks = true,
       .partsAlone = true,
-      .costs = {0.06, 45000, 50, 1, 2, int64_t{1400} << 20, 2400000000},
+      .costs = {0.06, 45000, 12, 1, 2, int64_t{1400} << 20, 600000000},
       .settings = makeSettings<MeshConfig>,
       .train = train,
+      .blockDemand = blockDemand,
       .openModel = openModel,
       .openBaker = openBaker,
       .bakeParameters = kBakeParameters,

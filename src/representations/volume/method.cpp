@@ -14,6 +14,10 @@ TrainingResult train(Device& device, const Capture& capture, const fs::path& mod
   return trainVolume(device, capture, model, {options, SettingsOf<VolumeConfig>::in(settings)});
 }
 
+BlockDemand blockDemand(const MethodSettings& settings, const BlockRunOptions& options) {
+  return volumeBlockDemand(SettingsOf<VolumeConfig>::in(settings), options);
+}
+
 // Opens the model with a renderer that culls as baking would at the current step.
 std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
   auto model = loadVolumeModel(device, folder);
@@ -58,9 +62,10 @@ const Method& volumeMethod() {
       .summary = "texels of blocks in sparse voxels and planes, shaded once a pixel (City-on-Web, MERF)",
       .trainsInBlocks = true,
       .swapsBlocks = true,
-      .costs = {0.07, 40000, 16, 1, 5, int64_t{700} << 20, 120000000},
+      .costs = {0.07, 40000, 8, 8, 5, int64_t{700} << 20, 120000000},
       .settings = makeSettings<VolumeConfig>,
       .train = train,
+      .blockDemand = blockDemand,
       .openModel = openModel,
       .openBaker = openBaker,
       .bakeParameters = kBakeParameters,

@@ -48,10 +48,10 @@ void requireStepsOfScenes(const HashConfig& config) {
               "use another one, or lod_step_fraction=0");
 }
 
-BlockLimits makeBlockLimits(const TrainHashOptions& options) {
+BlockLimits makeBlockLimits(const HashConfig& config, const BlockRunOptions& options) {
   BlockLimits limits;
-  limits.texelsPerEdge = options.config.lattice << options.config.fineLevels;
-  limits.bytesPerBlock = trainingBytesPerBlock(options.config);
+  limits.texelsPerEdge = config.lattice << config.fineLevels;
+  limits.bytesPerBlock = trainingBytesPerBlock(config);
   limits.memoryBudget = options.bytesForBlocks();
   return limits;
 }
@@ -62,7 +62,7 @@ class HashMethod final : public BlockMethod {
       : options_(options), model_(model), finest_(options.config) {}
 
   PartitionRequirements partitionRequirements() const override {
-    return {[&] { return makeBlockLimits(options_); },
+    return {[&] { return makeBlockLimits(options_.config, options_); },
             {kEnoughPhotos, int64_t{finest_.lattice} * finest_.lattice},
             finest_.photoBudgetMiB};
   }
@@ -118,6 +118,10 @@ void HashMethod::reportMemory(const BlockTraining& on) const {
 }
 
 }  // namespace
+
+BlockDemand hashBlockDemand(const HashConfig& config, const BlockRunOptions& options) {
+  return {makeBlockLimits(config, options), config.lodStepFraction, topLevel};
+}
 
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options) {
   HashConfig& config = options.config;

@@ -28,4 +28,7 @@ HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep);
 // Returns the bytes of memory that training takes for one block.
 double trainingBytesPerBlock(const HashConfig& config);
 
+// Returns how training divides a capture.
+BlockDemand hashBlockDemand(const HashConfig& config, const BlockRunOptions& options);
+
 }  // namespace tessera

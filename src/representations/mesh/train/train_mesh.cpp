@@ -44,13 +44,15 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+BlockLimits makeBlockLimits(const MeshConfig& config) {
+  BlockLimits limits;
+  limits.texelsPerEdge = static_cast<int>(config.meshCells * kTexelsPerCell);
+  limits.memoryBudget = std::numeric_limits<double>::infinity();  // only one block is trained at a time
+  return limits;
+}
+
 PartitionRequirements partitionRequirements(const MeshConfig& config) {
-  return {[&] {
-            BlockLimits limits;
-            limits.texelsPerEdge = static_cast<int>(config.meshCells * kTexelsPerCell);
-            limits.memoryBudget = std::numeric_limits<double>::infinity();  // only one block is trained at a time
-            return limits;
-          },
+  return {[&] { return makeBlockLimits(config); },
           {kEnoughPhotos, int64_t{config.meshCells} * config.meshCells},
           config.photoBudgetMiB};
 }
@@ -345,6 +347,10 @@ TrainingResult trainAllStages(Device& device, const Capture& given, const fs::pa
 }
 
 }  // namespace
+
+BlockDemand meshBlockDemand(const MeshConfig& config) {
+  return {.limits = makeBlockLimits(config)};
+}
 
 TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path& model, TrainMeshOptions options) {
   try {

@@ -18,4 +18,7 @@ struct TrainMeshOptions : BlockRunOptions {
 // before it trains anything if a part of that name does not exist, and as openBlockRun and runTraining do.
 TrainingResult trainMesh(Device& device, const Capture& capture, const fs::path& model, TrainMeshOptions options);
 
+// Returns how training divides a capture.
+BlockDemand meshBlockDemand(const MeshConfig& config);
+
 }  // namespace tessera

@@ -16,12 +16,12 @@ constexpr double kMiB = 1048576;
 constexpr double kWarnFraction = 0.02;  // of the pixels are excluded from training
 constexpr const char* kWaiting = "waiting";
 
-BlockLimits makeBlockLimits(const TrainVolumeOptions& options) {
+BlockLimits makeBlockLimits(const VolumeConfig& config, const BlockRunOptions& options) {
   BlockLimits limits;
-  limits.texelsPerEdge = options.config.planes;
-  limits.bytesPerBlock = trainingBytesPerBlock(options.config);
+  limits.texelsPerEdge = config.planes;
+  limits.bytesPerBlock = trainingBytesPerBlock(config);
   limits.memoryBudget = options.bytesForBlocks();
-  const int resident = options.config.residentBlocks;
+  const int resident = config.residentBlocks;
   if (resident == 0) return limits;
   const double bytes = resident * limits.bytesPerBlock;
   if (bytes > limits.memoryBudget) {
@@ -61,7 +61,7 @@ class VolumeMethod final : public BlockMethod {
   explicit VolumeMethod(const TrainVolumeOptions& options) : options_(options), finest_(options.config) {}
 
   PartitionRequirements partitionRequirements() const override {
-    return {[&] { return makeBlockLimits(options_); },
+    return {[&] { return makeBlockLimits(options_.config, options_); },
             {kEnoughPhotos, int64_t{finest_.planes} * finest_.planes / 16},
             finest_.photoBudgetMiB};
   }
@@ -143,6 +143,10 @@ void VolumeMethod::setPlannedSteps(int64_t steps) const {
 }
 
 }  // namespace
+
+BlockDemand volumeBlockDemand(const VolumeConfig& config, const BlockRunOptions& options) {
+  return {makeBlockLimits(config, options), config.lodStepFraction, topLevel};
+}
 
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {
   options.config.check();

@@ -32,4 +32,7 @@ std::unique_ptr<VolumeModel> loadVolumeModel(Device& device, const fs::path& fol
 // Returns the bytes that a block takes while it is trained: parameters, moments, gradients.
 double trainingBytesPerBlock(const VolumeConfig& config);
 
+// Returns how training divides a capture.
+BlockDemand volumeBlockDemand(const VolumeConfig& config, const BlockRunOptions& options);
+
 }  // namespace tessera
