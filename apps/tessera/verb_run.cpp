@@ -30,7 +30,7 @@ TrainingCosts typicalCosts(const MethodCosts& costs, bool onGpu) {
   return {.secondsPerStep = costs.secondsPerStep / speed,
           .raysPerSecond = costs.raysPerSecond * speed,
           .bakeSeconds = costs.bakeSeconds,
-          .secondsPerBakedMegapixel = costs.secondsPerBakedMegapixel,
+          .secondsPerBakedMegapixel = costs.secondsPerBakedMegapixel / speed,
           .secondsPerRenderedMegapixel = costs.secondsPerRenderedMegapixel,
           .trainBytes = costs.trainBytes,
           .modelBytes = costs.modelBytes,

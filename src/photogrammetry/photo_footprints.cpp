@@ -5,6 +5,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <optional>
 
 #include "base/order_statistics.h"
@@ -137,6 +138,33 @@ std::vector<PhotoFootprint> photoFootprints(const PhotoList& list, const std::ve
   return prints;
 }
 
+namespace {
+
+// Returns the largest group of footprints that overlap with one another, directly or by way of others.
+std::vector<PhotoFootprint> largestGroup(const std::vector<PhotoFootprint>& prints) {
+  std::vector<size_t> ungrouped(prints.size()), largest;
+  std::iota(ungrouped.begin(), ungrouped.end(), size_t{0});
+  while (ungrouped.size() > largest.size()) {
+    std::vector<size_t> group{ungrouped.back()};
+    ungrouped.pop_back();
+    for (size_t next = 0; next < group.size(); ++next) {
+      const PhotoFootprint& from = prints[group[next]];
+      const auto overlaps = std::partition(ungrouped.begin(), ungrouped.end(), [&](size_t other) {
+        return (prints[other].middle - from.middle).norm() > prints[other].radius + from.radius;
+      });
+      group.insert(group.end(), overlaps, ungrouped.end());
+      ungrouped.erase(overlaps, ungrouped.end());
+    }
+    if (group.size() > largest.size()) largest = std::move(group);
+  }
+  std::sort(largest.begin(), largest.end());
+  std::vector<PhotoFootprint> chosen;
+  for (const size_t i : largest) chosen.push_back(prints[i]);
+  return chosen;
+}
+
+}  // namespace
+
 std::optional<Capture> captureFromTags(const PhotoList& list) {
   const std::vector<bool> tellPlace = tellPlaces(list);
   const auto known = static_cast<size_t>(std::count(tellPlace.begin(), tellPlace.end(), true));
@@ -148,7 +176,7 @@ std::optional<Capture> captureFromTags(const PhotoList& list) {
         {body.width, body.height, LensModel::pinhole, {focal, focal, body.width / 2.0, body.height / 2.0}});
   }
   std::vector<GpsFix> fixes;
-  for (const PhotoFootprint& print : photoFootprints(list, tellPlace)) {
+  for (const PhotoFootprint& print : largestGroup(photoFootprints(list, tellPlace))) {
     const ListedPhoto& listed = list.photos[static_cast<size_t>(print.photo)];
     Photo photo;
     photo.name = listed.name;
@@ -160,6 +188,7 @@ std::optional<Capture> captureFromTags(const PhotoList& list) {
     for (const Vec2d& place : print.places) capture.points.push_back({Vec3d(place.x(), place.y(), 0), {}, 0});
     capture.photos.push_back(std::move(photo));
   }
+  if (fixes.size() < kLeastPhotos) return std::nullopt;
   capture.geo = frameAround(fixes);
   return capture;
 }

@@ -33,7 +33,8 @@ std::vector<bool> tellPlaces(const PhotoList& list);
 std::vector<PhotoFootprint> photoFootprints(const PhotoList& list, const std::vector<bool>& tellPlace);
 
 // Returns a capture of these photos, without files, in metres above the ground, with points on the ground where they
-// look, to tell how large the place is. Returns nothing if GPS tells the places of fewer than half of the photos, or of fewer than three.
+// look, to tell how large the place is: of several places, that of the largest group whose footprints overlap. Returns
+// nothing if GPS tells the places of fewer than half of the photos, or there are fewer than three in that group.
 std::optional<Capture> captureFromTags(const PhotoList& list);
 
 }  // namespace tessera

@@ -65,5 +65,16 @@ TEST(CaptureFromTags, IsOfThePhotosWhosePlacesAreKnown) {
   EXPECT_FALSE(captureFromTags(PhotoList{}).has_value());
 }
 
+TEST(CaptureFromTags, IsOfTheLargestOfSeveralPlaces) {
+  PhotoList list = survey(3, 4, 15);
+  for (ListedPhoto& photo : survey(2, 4, 15).photos) {
+    photo.tags.gps->longitude += 90;
+    list.photos.insert(list.photos.begin(), photo);
+  }
+  const auto capture = captureFromTags(list);
+  ASSERT_TRUE(capture.has_value());
+  EXPECT_EQ(capture->photos.size(), 12u);
+}
+
 }  // namespace
 }  // namespace tessera

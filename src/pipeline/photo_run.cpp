@@ -103,7 +103,7 @@ class PhotoRun {
          .settings = (frames_ && options_.downscale == 0
                           ? fmt::format("{} {} {:.0f}", options_.method, training, options_.costs.raysPerSecond)
                           : std::to_string(downscale())) +
-                     " " + describeHoldOut() + (posed_ ? " " + posed_->digest() : ""),
+                     " " + describeHoldOut(options_.holdout) + (posed_ ? " " + posed_->digest() : ""),
          .isComplete =
              [this] {
                return has("capture/transforms.json")() &&
@@ -122,7 +122,7 @@ class PhotoRun {
          .needs =
              [this](bool resumes) {
                isModelKept_ = false;
-               return withoutDone(trainingNeeds().train, resumes ? shareTrained() : 0);
+               return trainNeeds(resumes);
              },
          .run = [this](bool) { return train(); }},
         {.name = "bake",
@@ -173,6 +173,7 @@ class PhotoRun {
                   "name a folder of JPEG or PNG photos, or a video");
     }
     photosDigest_ = describePhotos();
+    costs_.reset();
     if (masks_) masks_->addTo(list_);
     estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, photosDigest_);
   }
@@ -218,12 +219,6 @@ class PhotoRun {
     } catch (const Error&) {  // damaged: it will be written again, or evaluation says so
     }
     return posed_ ? posed_->holdsOut() : options_.holdout != "none";
-  }
-  // Of a list, what it contains.
-  std::string describeHoldOut() const {
-    constexpr std::string_view kList = "list:";
-    const std::string& holdout = options_.holdout;
-    return holdout.starts_with(kList) ? "list " + textDigest(readTextFile(holdout.substr(kList.size()))) : holdout;
   }
 
   StageOutcome inspect() {
@@ -371,6 +366,11 @@ class PhotoRun {
     return options_.steps > 0 ? 0 : done.seconds / (60 * options_.minutes);
   }
 
+  StageNeeds trainNeeds(bool resumes) {
+    const double finest = 1 / (1 + costs().coarserLevels);  // which is trained first
+    return withoutDone(trainingNeeds().train, resumes ? finest * shareTrained() : 0);
+  }
+
   // A model that was trained on something else or in another way is kept beside the new one.
   void setModelAside() {
     std::error_code status;
@@ -391,6 +391,7 @@ class PhotoRun {
       arguments.insert(arguments.end(), {"--minutes", fmt::format("{}", options_.minutes)});
     }
     inform("to watch the training: tail -f {}", (options_.out / "logs" / "train.log").string());
+    checkRoom({{{"train", trainNeeds(true)}, {"bake", trainingNeeds().bake}}}, options_.out);
     const StageOutcome outcome = runVerb(options_, "train", arguments);
     isModelKept_ = true;
     return outcome;
@@ -447,7 +448,7 @@ class PhotoRun {
     if (!options_.costsOnCapture) return *costs_;
     try {
       if (const auto capture = expectedCapture()) costs_ = options_.costsOnCapture(*capture);
-    } catch (const Error&) {  // damaged: it will be written again, or training says so
+    } catch (const std::exception&) {  // a damaged capture, of which training says so; the plan is only advice
     }
     return *costs_;
   }
@@ -455,7 +456,7 @@ class PhotoRun {
   TrainingNeeds trainingNeeds() {
     TrainingSize size = posed_ ? posed_->trainingSize(downscale()) : estimator_->trainingSize(downscale());
     if (isModelKept_) size.raysPerSecond = readRaysPerSecond(out("model"));
-    return planTraining(size, costs());
+    return posed_ || isCaptureKept_ ? planTraining(size, costs()) : planGuessedTraining(size, costs(), options_.costs);
   }
 
   PhotoRunOptions options_;

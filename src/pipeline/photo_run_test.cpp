@@ -9,6 +9,7 @@
 #include "base/image_io.h"
 #include "base/testing/shared_data.h"
 #include "base/testing/temporary_folder.h"
+#include "photogrammetry/testing/survey_photos.h"
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
 #include "pipeline/posed_source.h"
@@ -89,6 +90,42 @@ TEST_F(PhotoRuns, OfPosedPhotosImportThemAgainIfWhatTheReportNeedsIsLost) {
   const std::string said = run();
   EXPECT_FALSE(contains(said, "capture    finished before")) << said;
   EXPECT_TRUE(has("poses/left_out.json"));
+}
+
+TEST_F(PhotoRuns, PlanForTheBlocksThatTagsAndThenTheCaptureTell) {
+  std::vector<Capture> planned;
+  options_.costs.trainBytes = 100 << 20;
+  options_.costsOnCapture = [&](const Capture& capture) {
+    planned.push_back(capture);
+    TrainingCosts costs = options_.costs;
+    costs.trainBytes += static_cast<int64_t>(capture.photos.size()) << 20;
+    return costs;
+  };
+  for (int i = 0; i < 12; ++i) {
+    writeSurveyPhoto(options_.photos / ("a" + std::to_string(i) + ".jpg"),
+                     {.gps = {46.5 + 1e-4 * (i / 4), 6.5 + 1e-4 * (i % 4), 400, 60}, .seconds = 3.0 * i});
+  }
+  options_.dryRun = true;
+  options_.range.until = "";
+  std::string said = run();
+  ASSERT_EQ(planned.size(), 1u) << said;
+  EXPECT_EQ(planned[0].photos.size(), 12u);
+  EXPECT_EQ(planned[0].cameras[0].width, 9) << "8 pixels, and a tenth more to be safe";
+  EXPECT_TRUE(contains(said, " 112 MiB")) << said;
+
+  planned.clear();
+  options_.photos = folder_ / "posed";
+  options_.dryRun = false;
+  options_.program = (folder_ / "absent").string();
+  writePosed(9);
+  const std::string png = readTextFile(options_.photos / "images/a4.png");
+  writeFileAtomically(options_.photos / "images/a4.png", png.substr(0, png.size() - 20));
+  said = run();
+  EXPECT_TRUE(contains(said, "absent: cannot be run")) << said;
+  ASSERT_EQ(planned.size(), 2u);
+  EXPECT_EQ(planned[0].photos.size(), 9u) << "those of the source";
+  EXPECT_EQ(planned[0].cameras[0].width, 16);
+  EXPECT_EQ(planned[1].photos.size(), 8u) << "those of the capture";
 }
 
 TEST_F(PhotoRuns, NamePhotosThatTheCaptureLacks) {

@@ -104,7 +104,9 @@ PosedSource::PosedSource(const PhotoRunOptions& options)
       width = image.width;
       height = image.height;
       readable.push_back(photo);
+      pictureSizes_.emplace_back(width, height);
     } catch (const Error&) {  // it will be left out
+      pictureSizes_.emplace_back(0, 0);
       if (static_cast<size_t>(photo.camera) >= capture.cameras.size()) continue;
       width = capture.cameras[static_cast<size_t>(photo.camera)].width;
       height = capture.cameras[static_cast<size_t>(photo.camera)].height;
@@ -147,6 +149,20 @@ TrainingSize PosedSource::trainingSize(int downscale) const {
 
 Capture PosedSource::capture() const {
   SourceCapture copy = source_;
+  copy.flight.clear();
+  copy.capture.photos.clear();
+  copy.capture.cameras.clear();
+  std::vector<Camera>& cameras = copy.capture.cameras;
+  for (size_t i = 0; i < source_.capture.photos.size(); ++i) {
+    Photo photo = source_.capture.photos[i];
+    const auto [width, height] = pictureSizes_[i];
+    if (width == 0 || static_cast<size_t>(photo.camera) >= source_.capture.cameras.size()) continue;
+    const Camera camera = source_.capture.cameras[static_cast<size_t>(photo.camera)].scaledTo(width, height);
+    const auto match = std::find(cameras.begin(), cameras.end(), camera);
+    photo.camera = static_cast<int>(match - cameras.begin());
+    if (match == cameras.end()) cameras.push_back(camera);
+    copy.capture.photos.push_back(std::move(photo));
+  }
   if (!copy.capture.photos.empty()) orientWorld(copy, {});
   return std::move(copy.capture);
 }

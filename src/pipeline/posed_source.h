@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "import/source.h"
@@ -28,7 +29,9 @@ class PosedSource {
   const TrainingSize& trainingSize() const { return size_; }
   bool holdsOut() const { return size_.heldOut > 0; }  // whether photos are held out, if none is dropped at import
   TrainingSize trainingSize(int downscale) const;      // in the folder of the run
-  Capture capture() const;                             // until it is taken: with Z up, as import would turn it
+  // Until the source is taken: the photos that can be read, with Z up as import turns it if no tags tell more. Of
+  // observations, only the points count.
+  Capture capture() const;
 
  private:
   explicit PosedSource(const PhotoRunOptions& options);
@@ -37,6 +40,7 @@ class PosedSource {
   SourceCapture source_;
   std::string digest_;
   std::vector<ListedPhoto> photos_;
+  std::vector<std::pair<int, int>> pictureSizes_;  // width and height, as on disk; 0: it cannot be read
   TrainingSize size_;
 };
 

@@ -206,10 +206,24 @@ TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs)
   return needs;
 }
 
+TrainingNeeds planGuessedTraining(const TrainingSize& size, const TrainingCosts& costs, const TrainingCosts& certain) {
+  TrainingNeeds needs = planTraining(size, costs);
+  const TrainingNeeds least = planTraining(size, certain);
+  const auto compare = [](StageNeeds& guessed, const StageNeeds& known) {
+    guessed.guessedMemoryBytes = guessed.memoryBytes - known.memoryBytes;
+    guessed.guessedDiskBytes = guessed.diskBytes - known.diskBytes;
+  };
+  compare(needs.train, least.train);
+  compare(needs.bake, least.bake);
+  compare(needs.evaluate, least.evaluate);
+  return needs;
+}
+
 StageNeeds withoutDone(StageNeeds needs, double share) {
   const double left = std::clamp(1 - share, 0.0, 1.0);
   needs.seconds *= left;
-  needs.diskBytes = static_cast<int64_t>(left * static_cast<double>(needs.diskBytes));
+  for (int64_t* bytes : {&needs.diskBytes, &needs.guessedDiskBytes})
+    *bytes = static_cast<int64_t>(left * static_cast<double>(*bytes));
   return needs;
 }
 
@@ -248,21 +262,33 @@ std::string describePlan(const RunPlan& plan) {
 
 void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes, int64_t memoryBytes) {
   constexpr double kGigabyte = 1e9, kGiB = 1 << 30;
-  const int64_t disk = plan.total().diskBytes;
-  if (disk > freeBytes) {
-    throw Error(folder.string(), "",
-                fmt::format("would take {:.1f} GB, and {:.1f} GB of its disk are free",
-                            static_cast<double>(disk) / kGigabyte, static_cast<double>(freeBytes) / kGigabyte),
-                "name a folder on another disk, or make the photos smaller");
-  }
+  constexpr const char* kGuessed = "how large the place is, is known when there are poses";
+  const StageNeeds total = plan.total();
+  const std::string disk =
+      fmt::format("take {:.1f} GB, and {:.1f} GB of its disk are free",
+                  static_cast<double>(total.diskBytes) / kGigabyte, static_cast<double>(freeBytes) / kGigabyte);
+  if (total.diskBytes - total.guessedDiskBytes > freeBytes)
+    throw Error(folder.string(), "", "would " + disk, "name a folder on another disk, or make the photos smaller");
+  if (total.diskBytes > freeBytes) warn("{}: may {}; {}", folder.string(), disk, kGuessed);
   for (const RunPlan::Entry& entry : plan.entries) {
-    if (entry.needs.memoryBytes <= memoryBytes) continue;
-    throw Error(
-        "stage " + entry.stage, "",
-        fmt::format("would take {:.1f} GiB of memory of {:.1f} GiB",
-                    static_cast<double>(entry.needs.memoryBytes) / kGiB, static_cast<double>(memoryBytes) / kGiB),
-        "raise --downscale if it is `train`, else use fewer --threads or photos; or use a machine with more memory");
+    const StageNeeds& needs = entry.needs;
+    const std::string memory =
+        fmt::format("take {:.1f} GiB of memory of {:.1f} GiB", static_cast<double>(needs.memoryBytes) / kGiB,
+                    static_cast<double>(memoryBytes) / kGiB);
+    if (needs.memoryBytes - needs.guessedMemoryBytes > memoryBytes) {
+      throw Error(
+          "stage " + entry.stage, "", "would " + memory,
+          "raise --downscale if it is `train`, else use fewer --threads or photos; or use a machine with more memory");
+    }
+    if (needs.memoryBytes > memoryBytes) warn("stage {}: may {}; {}", entry.stage, memory, kGuessed);
   }
+}
+
+void checkRoom(const RunPlan& plan, const fs::path& folder) {
+  std::error_code status;
+  const auto space = fs::space(folder, status);
+  constexpr int64_t kUnknown = std::numeric_limits<int64_t>::max();
+  requireRoom(plan, folder, status ? kUnknown : static_cast<int64_t>(space.available), usableMemoryBytes());
 }
 
 void announcePlan(const RunPlan& plan, const fs::path& folder) {
@@ -272,10 +298,7 @@ void announcePlan(const RunPlan& plan, const fs::path& folder) {
     inform("this will take about {}, up to {:.1f} GiB of memory and {:.2f} GB of disk", describeDuration(total.seconds),
            static_cast<double>(total.memoryBytes) / kGiB, static_cast<double>(total.diskBytes) / kGigabyte);
   }
-  std::error_code status;
-  const auto space = fs::space(folder, status);
-  constexpr int64_t kUnknown = std::numeric_limits<int64_t>::max();
-  requireRoom(plan, folder, status ? kUnknown : static_cast<int64_t>(space.available), usableMemoryBytes());
+  checkRoom(plan, folder);
 }
 
 }  // namespace tessera

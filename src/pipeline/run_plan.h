@@ -82,6 +82,8 @@ struct TrainingNeeds {
   StageNeeds capture, train, bake, evaluate;
 };
 TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs);
+// The same by the costs of a place whose size is guessed. `certain`: the costs at least.
+TrainingNeeds planGuessedTraining(const TrainingSize& size, const TrainingCosts& costs, const TrainingCosts& certain);
 
 inline constexpr int kLongestSide = 1600, kShortestSide = 400;  // pixels of the longer side of a photo
 
@@ -94,10 +96,13 @@ int chooseDownscale(const TrainingSize& size, const TrainingCosts& costs);
 std::string describePlan(const RunPlan& plan);
 
 // Throws Error, with a remedy, if a plan takes more disk than is free where `folder` is, or a stage more memory than
-// there is.
+// there is. Of what is guessed, it only warns.
 void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes, int64_t memoryBytes);
 
-// States what a plan takes, if that is long, and refuses what does not fit, as requireRoom.
+// requireRoom with the disk and the memory of this machine.
+void checkRoom(const RunPlan& plan, const fs::path& folder);
+
+// States what a plan takes, if that is long, and checks it.
 void announcePlan(const RunPlan& plan, const fs::path& folder);
 
 // Returns what is left of a stage of which this share, from 0 to 1, is done.

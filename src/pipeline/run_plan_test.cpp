@@ -168,6 +168,38 @@ TEST(RunPlan, RefusesWhatDoesNotFit) {
             "photos; or use a machine with more memory");
 }
 
+TEST(RunPlan, OnlyWarnsOfWhatIsGuessed) {
+  RunPlan plan{{{"train",
+                 {.seconds = 600,
+                  .memoryBytes = 4000 * kMiB,
+                  .diskBytes = 900 * kMiB,
+                  .guessedMemoryBytes = 1000 * kMiB,
+                  .guessedDiskBytes = 500 * kMiB}}}};
+  testing::internal::CaptureStderr();
+  requireRoom(plan, "place", 500 * kMiB, 3500 * kMiB);
+  const std::string said = testing::internal::GetCapturedStderr();
+  EXPECT_NE(said.find("place: may take 0.9 GB, and 0.5 GB of its disk are free; how large the place is, is known when"),
+            said.npos)
+      << said;
+  EXPECT_NE(said.find("stage train: may take 3.9 GiB of memory of 3.4 GiB"), said.npos) << said;
+  EXPECT_THROW(requireRoom(plan, "place", 300 * kMiB, 3500 * kMiB), Error);
+  EXPECT_THROW(requireRoom(plan, "place", 500 * kMiB, 2900 * kMiB), Error);
+  const StageNeeds half = withoutDone(plan.entries[0].needs, 0.5);
+  EXPECT_EQ(half.guessedDiskBytes, 250 * kMiB);
+}
+
+TEST(RunPlan, TellsWhatTheSizeOfThePlaceAdds) {
+  const TrainingCosts certain{.trainBytes = 100 * kMiB, .modelBytes = 50 * kMiB};
+  TrainingCosts guessed = certain;
+  guessed.trainBytes += 400 * kMiB;
+  guessed.modelBytes *= 4;
+  const TrainingSize size{.photos = 100, .heldOut = 20, .photoPixels = 1000, .minutes = 10};
+  const StageNeeds train = planGuessedTraining(size, guessed, certain).train;
+  EXPECT_EQ(train.guessedMemoryBytes, 400 * kMiB);
+  EXPECT_EQ(train.guessedDiskBytes, 150 * kMiB);
+  EXPECT_EQ(train.diskBytes, 200 * kMiB);
+}
+
 TEST(MatchingRates, AreReadBack) {
   const MatchingRates rates{1.5, 0.25, 1e6, 5000.5, 321};
   const std::string text = encodeMatchingRates(rates, "these photos");

@@ -15,7 +15,7 @@ constexpr std::string_view kListOfHeldOut = "list:";  // of --holdout
 
 // So that it is found from any folder.
 std::string absolutePath(const fs::path& path) {
-  return fs::absolute(path).lexically_normal().string();
+  return path.empty() ? "" : fs::absolute(path).lexically_normal().string();
 }
 
 // The flags that the results depend on. Those whose value is the default of nothing are left out.
@@ -99,6 +99,11 @@ RunRequest describeRequest(const PhotoRunOptions& options) {
   if (!options.range.from.empty()) request.command += " --from " + options.range.from;
   if (!options.range.until.empty()) request.command += " --until " + options.range.until;
   return request;
+}
+
+std::string describeHoldOut(const std::string& rule) {
+  if (!rule.starts_with(kListOfHeldOut)) return rule;
+  return "list " + textDigest(readTextFile(rule.substr(kListOfHeldOut.size())));
 }
 
 void adoptEarlierFlags(PhotoRunOptions& options, const std::set<std::string>& given) {

@@ -23,4 +23,7 @@ void adoptEarlierFlags(PhotoRunOptions& options, const std::set<std::string>& gi
 // Whether a path is a folder or lies in it.
 bool liesIn(const fs::path& path, const fs::path& folder);
 
+// Returns the rule of held-out photos with what its list contains. Throws Error if the list cannot be read.
+std::string describeHoldOut(const std::string& rule);
+
 }  // namespace tessera

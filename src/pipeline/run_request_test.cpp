@@ -68,6 +68,11 @@ TEST_F(RunRequests, AreKeptOfACallThatFindsEverythingDone) {
   EXPECT_EQ(after[0].seconds, before[0].seconds);
 }
 
+TEST_F(RunRequests, DescribeAListWithoutAName) {
+  options_.holdout = "list:";
+  EXPECT_EQ(describeRequest(options_).flags.at("--holdout"), "list:") << "which is refused in its own words";
+}
+
 TEST_F(RunRequests, PreferTheFlagsThatAreGiven) {
   PhotoRunOptions earlier = options_;
   earlier.steps = 300;

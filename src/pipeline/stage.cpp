@@ -164,6 +164,7 @@ StageNeeds RunPlan::total() const {
     total.seconds += entry.needs.seconds;
     total.memoryBytes = std::max(total.memoryBytes, entry.needs.memoryBytes);
     total.diskBytes += entry.needs.diskBytes;
+    total.guessedDiskBytes += entry.needs.guessedDiskBytes;
   }
   return total;
 }
@@ -215,7 +216,7 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
   if (remaining.interrupted) done.push_back(*remaining.interrupted);
   for (const Record& before : done) plan.entries.push_back({"", {before.seconds, before.peakBytes, 0}});
   record(plan.total());
-  if (remaining.first == remaining.end) {  // the next call without flags is for those of this one all the same
+  if (remaining.first == stages.size()) {  // the next call without flags is for those of this one all the same
     Json before = readRun(file);
     if (before.is_object()) {
       before["request"] = request.command;

@@ -22,6 +22,8 @@ struct StageNeeds {
   double seconds = 0;
   int64_t memoryBytes = 0;  // at once, of the programs that it runs
   int64_t diskBytes = 0;    // that it adds
+  // Of these, what follows from a guess of how large the place is.
+  int64_t guessedMemoryBytes = 0, guessedDiskBytes = 0;
 };
 
 struct Stage {

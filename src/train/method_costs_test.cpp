@@ -56,6 +56,12 @@ TEST(MethodCosts, GrowWithTheBlocksThatTrainingCuts) {
   EXPECT_EQ(costs.secondsPerStep, 0.1) << "of all blocks together";
 }
 
+TEST(MethodCosts, LeaveBlocksThatAGpuStoresOutOfTheMachinesMemory) {
+  const MethodCosts costs = costsOnCapture(method(), flight(10, 8, 20, 60), uint64_t{24} << 30);
+  EXPECT_EQ(costs.trainBytes, 500);
+  EXPECT_GT(costs.modelBytes, 4 * 300);
+}
+
 TEST(MethodCosts, OfBlocksThatAreTrainedOneAfterAnotherGrowInTimeAlone) {
   Method alone = method();
   alone.partsAlone = true;
