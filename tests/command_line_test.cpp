@@ -1,6 +1,7 @@
 // Runs the program as a user does: its output, the files that it writes, and its exit status.
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <regex>
@@ -551,12 +552,14 @@ TEST_F(CommandLine, EndsWithTheSameBytesHoweverOftenItIsKilled) {
 }
 
 TEST_F(CommandLine, SavesAndTellsWhenItIsInterrupted) {
-  for (const int signal : {SIGINT, SIGTERM}) {
+  std::signal(SIGHUP, SIG_DFL);  // with `nohup`, it would be ignored
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
     const std::string name = at("interrupted-" + std::to_string(signal));
     Program program(folder_, trainArguments(name, {"--steps", "100000000"}));
     waitForFile(program, name + "/blocks.json");
     std::this_thread::sleep_for(std::chrono::milliseconds(200));
     program.kill(signal);
+    program.kill(signal);  // by the same parent at once, as a run that passes on what both have received
     const Said said = program.wait();
     EXPECT_EQ(said.exitCode, 128 + signal) << said.err;
     EXPECT_TRUE(contains(said.out, "stopped on request; go on with --resume")) << said.out;

@@ -1,11 +1,13 @@
 // tessera: turns photographs of a large place into a neural scene. Every verb calls one library function; errors are
 // caught here.
 
+#include <fcntl.h>
 #include <malloc.h>
+#include <unistd.h>
 
-#include <atomic>
 #include <csignal>
 #include <cstdio>
+#include <ctime>
 
 #include "apps/tessera/verbs.h"
 
@@ -13,13 +15,34 @@ namespace tessera {
 namespace {
 
 volatile std::sig_atomic_t firstSignal = 0;
+timespec firstTime{};
 
-void onInterrupt(int signal) {
-  if (firstSignal != 0) {
-    std::signal(signal, SIG_DFL);
-    std::raise(signal);
+double secondsSinceFirst() {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<double>(now.tv_sec - firstTime.tv_sec) +
+         1e-9 * static_cast<double>(now.tv_nsec - firstTime.tv_nsec);
+}
+
+void onInterrupt(int signal, siginfo_t* info, void*) {
+  constexpr double kPassedOn = 2;  // seconds
+  if (firstSignal == 0) {
+    ::clock_gettime(CLOCK_MONOTONIC, &firstTime);
+    firstSignal = signal;
+    return;
   }
-  firstSignal = signal;
+  // A system that shuts down signals `run` and the verb that it runs, and `run` passes its signal on.
+  if (info->si_pid == ::getppid() && secondsSinceFirst() < kPassedOn) return;
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
+}
+
+// Descriptors 0 to 2 that are closed would be those of the next files, which would get this program's messages.
+void openStandardStreams() {
+  int next = 0;
+  do next = ::open("/dev/null", O_RDWR);
+  while (next >= 0 && next <= STDERR_FILENO);
+  if (next >= 0) ::close(next);
 }
 
 }  // namespace
@@ -33,13 +56,23 @@ int interruptedStatus() {
 }
 
 void catchInterrupts() {
-  std::signal(SIGINT, onInterrupt);
-  std::signal(SIGTERM, onInterrupt);
+  struct sigaction action {};
+  action.sa_sigaction = onInterrupt;
+  action.sa_flags = SA_SIGINFO | SA_RESTART;
+  ::sigemptyset(&action.sa_mask);
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+    struct sigaction before {};
+    // `nohup` has hangups ignored.
+    if (::sigaction(signal, nullptr, &before) == 0 && signal == SIGHUP && before.sa_handler == SIG_IGN) continue;
+    ::sigaction(signal, &action, nullptr);
+  }
 }
 
 }  // namespace tessera
 
 int main(int argc, char** argv) {
+  tessera::openStandardStreams();
+  std::signal(SIGCHLD, SIG_DFL);  // else no program that is started could be waited for
   // Returns the memory of evicted photos to the system, whatever their size. By default, glibc raises this threshold
   // and keeps the memory in fragments that other allocations do not fit.
   mallopt(M_MMAP_THRESHOLD, 1 << 19);

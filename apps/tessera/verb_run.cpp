@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <csignal>
 #include <set>
 
 #include "apps/tessera/command_line.h"
@@ -131,6 +132,7 @@ void addRunVerb(CLI::App& app) {
     };
     options->interrupted = interrupted;
     catchInterrupts();
+    std::signal(SIGPIPE, SIG_IGN);  // a program that reads the messages may end first
     try {
       runFromPhotos(*options);
     } catch (const RunInterrupted&) {

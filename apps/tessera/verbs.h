@@ -26,10 +26,11 @@ void addExportVerb(CLI::App& app);
 void addInfoVerb(CLI::App& app);
 void addBenchVerb(CLI::App& app);
 
-// Returns whether SIGINT or SIGTERM has been received; a second signal ends the process at once.
+// Returns whether SIGINT, SIGTERM or SIGHUP has been received; a second signal ends the process at once, unless the
+// parent process passes on what both have received.
 bool interrupted();
 // Returns the exit status of a verb that was interrupted before its end, for CLI::RuntimeError: 130 for SIGINT, 143 for
-// SIGTERM.
+// SIGTERM, 129 for SIGHUP.
 int interruptedStatus();
 void catchInterrupts();
 

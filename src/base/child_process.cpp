@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cctype>
 #include <cerrno>
 #include <chrono>
@@ -23,6 +24,15 @@ namespace tessera {
 namespace {
 
 constexpr int kUnknownEnd = 1 << 8;  // of a program that something else has waited for: status 1
+
+std::atomic<int64_t> peakOfChildren = 0;
+
+int64_t recordPeak(const rusage& usage) {
+  const int64_t bytes = int64_t{usage.ru_maxrss} << 10;
+  for (int64_t largest = peakOfChildren; bytes > largest && !peakOfChildren.compare_exchange_weak(largest, bytes);) {
+  }
+  return bytes;
+}
 
 }  // namespace
 
@@ -68,6 +78,7 @@ std::string ChildProcess::start(std::vector<std::string> arguments, const ChildO
   if (process == 0) {
     // Other threads do not exist here and may have held any lock: only system calls.
     ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    ::signal(SIGPIPE, SIG_DFL);  // this program may ignore it
     if (options.hasOwnGroup) ::setpgid(0, 0);
     if (::getppid() == parent && ::dup2(input, STDIN_FILENO) >= 0 && ::dup2(output, STDOUT_FILENO) >= 0 &&
         ::dup2(messages_.get(), STDERR_FILENO) >= 0) {
@@ -99,7 +110,7 @@ bool ChildProcess::waitFor(double seconds) {
     const pid_t ended = ::wait4(process_, &status_, WNOHANG, &usage);
     if (ended < 0 && errno != EINTR) status_ = kUnknownEnd;
     ended_ = ended == process_ || (ended < 0 && errno != EINTR);
-    if (ended_) peakBytes_ = int64_t{usage.ru_maxrss} << 10;
+    if (ended_) peakBytes_ = recordPeak(usage);
     if (ended_ || steady_clock::now() >= end) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
@@ -114,13 +125,17 @@ std::string ChildProcess::wait() {
     while ((ended = ::wait4(process_, &status_, 0, &usage)) < 0 && errno == EINTR) {
     }
     if (ended < 0) status_ = kUnknownEnd;
-    peakBytes_ = int64_t{usage.ru_maxrss} << 10;
+    peakBytes_ = recordPeak(usage);
   }
   process_ = -1;
   ended_ = false;
   if (WIFSIGNALED(status_)) return fmt::format("was ended by signal {}", WTERMSIG(status_));
   if (!WIFEXITED(status_) || WEXITSTATUS(status_) == 0) return "";
   return fmt::format("ended with status {}", WEXITSTATUS(status_));
+}
+
+int64_t takePeakOfChildren() {
+  return peakOfChildren.exchange(0);
 }
 
 void ChildProcess::interrupt() {

@@ -70,4 +70,8 @@ class ChildProcess {
   Descriptor messages_;  // a memory file, or the log
 };
 
+// Returns the largest ChildProcess::peakBytes of the children that ended since this was called before, killed ones,
+// too.
+int64_t takePeakOfChildren();
+
 }  // namespace tessera

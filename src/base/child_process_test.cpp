@@ -71,6 +71,21 @@ TEST(ChildProcess, TellsItsPeakMemory) {
   ASSERT_EQ(process.start({"dd", "if=/dev/zero", "of=/dev/null", "bs=64M", "count=1"}), "");
   EXPECT_EQ(process.wait(), "");
   EXPECT_GT(process.peakBytes(), int64_t{64} << 20);
+  ASSERT_EQ(process.start({"true"}), "");
+  EXPECT_EQ(process.wait(), "");
+  EXPECT_GT(takePeakOfChildren(), int64_t{64} << 20);
+  EXPECT_EQ(takePeakOfChildren(), 0);
+  ASSERT_EQ(process.start({"sleep", "100"}), "");
+  process.kill();
+  EXPECT_GT(takePeakOfChildren(), 0) << "of killed ones, too";
+}
+
+TEST(ChildProcess, IsEndedByAPipeThatNobodyReads) {
+  const auto before = ::signal(SIGPIPE, SIG_IGN);  // as `tessera run` does, for itself
+  ChildProcess process;
+  ASSERT_EQ(process.start({"sh", "-c", "kill -PIPE $$; echo alive"}), "");
+  EXPECT_EQ(process.wait(), "was ended by signal 13");
+  ::signal(SIGPIPE, before);
 }
 
 // Starts a program in a process that is then killed, and returns the number of that program.

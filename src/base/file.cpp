@@ -155,4 +155,11 @@ bool naturalLess(std::string_view a, std::string_view b) {
   return a < b;
 }
 
+bool isNearlyFull(const fs::path& path) {
+  constexpr uintmax_t kFew = 16 << 20;
+  std::error_code status;
+  const auto space = fs::space(path, status);
+  return !status && space.available < kFew;
+}
+
 }  // namespace tessera

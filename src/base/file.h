@@ -24,6 +24,9 @@ std::string readTextFile(const fs::path& path, uint64_t maxBytes = UINT64_MAX);
 // cannot be read.
 Bytes readFileStart(const fs::path& path, uint64_t bytes);
 
+// Whether so little is free on the disk of `path` that a program which failed may have failed for that.
+bool isNearlyFull(const fs::path& path);
+
 // Writes `path` + ".partial-<pid>" and renames it over `path`, so that a reader sees either the old file or the new
 // one, never a part, even if the process is killed. With `durable` the bytes reach the disk before the rename. Missing
 // parent folders are created. Where `path` is a pipe or a device, the bytes are written to it directly. Throws Error

@@ -47,8 +47,12 @@ uint64_t statedPhotos(const fs::path& folder) {
 }
 
 void removeFolder(const fs::path& folder) {
+  // At once: whether a folder is there says whether something is finished.
+  const fs::path discarded = fs::path(folder) += ".discarded";
   std::error_code status;
-  fs::remove_all(folder, status);
+  fs::remove_all(discarded, status);
+  if (fs::exists(folder, status)) fs::rename(folder, discarded, status);
+  if (!status) fs::remove_all(discarded, status);
   if (status) throw Error(folder.string(), "", "cannot be removed: " + status.message(), "remove it");
 }
 

@@ -43,6 +43,20 @@ TEST(ColmapProgram, TellsThatItWasKilledFromThatItFailed) {
   EXPECT_EQ(errorMessage([&] { run("exit 3"); }).find("Check failed"), std::string::npos) << "words of the run before";
 }
 
+TEST(ColmapProgram, TellsThatMemoryRanOutWhateverItSaysAfterwards) {
+  const TemporaryFolder folder;
+  const std::string script = "echo 'what():  std::bad_alloc'; for i in 1 2 3 4 5 6 7 8 9; do echo " +
+                             std::string(200, '@') + "; done; kill -6 $$";
+  EXPECT_THROW(ColmapProgram(folder / "log", writeColmap(folder, script)).run({"x"}), ColmapKilled);
+}
+
+TEST(ColmapProgram, TellsThatItWasKilledBeforeItsVersionWasKnown) {
+  const TemporaryFolder folder;
+  writeFileAtomically(folder / "program", "#!/bin/sh\nkill -2 $$\n");
+  fs::permissions(folder / "program", fs::perms::owner_all);
+  EXPECT_THROW(ColmapProgram(folder / "log", (folder / "program").string()), ColmapKilled);
+}
+
 TEST(ColmapDatabase, HoldsCamerasAndPhotosOnce) {
   const TemporaryFolder folder;
   makeDatabase(folder / "database.db");

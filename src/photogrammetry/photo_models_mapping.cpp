@@ -255,6 +255,7 @@ std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<i
   } catch (const ColmapKilled&) {
     throw;
   } catch (const Error& error) {
+    watch(lastRegistered(log));
     if (readEnd(log).find(kNoModel) == std::string::npos) warn("no further models: {}", error.what());
   }
   moveIntoSubfolder(rest);

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "base/error.h"
+#include "base/log.h"
 
 namespace tessera {
 
@@ -25,6 +26,11 @@ FolderLock::FolderLock(const fs::path& folder) {
     const std::string number = fmt::format("{}\n", ::getpid());
     if (::ftruncate(file_.get(), 0) == 0) [[maybe_unused]]
       const auto written = ::write(file_.get(), number.data(), number.size());
+    return;
+  }
+  if (errno != EWOULDBLOCK) {
+    warn("{}: this disk knows no locks ({}): no other run must work in the folder at the same time", file.string(),
+         std::strerror(errno));
     return;
   }
   std::string other = readTextFile(file);

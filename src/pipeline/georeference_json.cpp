@@ -103,9 +103,9 @@ GeoreferenceFile parseGeoreference(const Json& json) {
     if (parsed.reason.empty()) throw Damaged();
     return parsed;
   }
-  parsed.hasAltitudes = toBool(member(json, "has_altitudes"));
-  if (json.contains("ignores_take_off"))
-    parsed.ignoresTakeOff = toBool(json["ignores_take_off"]);  // earlier ones lack it
+  // Earlier ones lack these.
+  if (json.contains("has_altitudes")) parsed.hasAltitudes = toBool(json["has_altitudes"]);
+  if (json.contains("ignores_take_off")) parsed.ignoresTakeOff = toBool(json["ignores_take_off"]);
   parsed.fixes = toCount(member(json, "fixes"));
   parsed.inliers = toCount(member(json, "agreeing"));
   if (parsed.inliers > parsed.fixes) throw Damaged();

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -30,15 +29,29 @@
 #include "pipeline/run_estimator.h"
 #include "pipeline/run_report.h"
 #include "pipeline/run_request.h"
-#include "pipeline/training_progress.h"
+#include "pipeline/training_planner.h"
 #include "pipeline/verb_process.h"
 
 namespace tessera {
 namespace {
 
+// Whether reading a file throws no Error.
+bool isReadable(const std::function<void()>& read) {
+  try {
+    read();
+    return true;
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 class PhotoRun {
  public:
-  explicit PhotoRun(const PhotoRunOptions& options) : options_(options), posed_(PosedSource::open(options_)) {
+  explicit PhotoRun(const PhotoRunOptions& options)
+      : options_(options),
+        posed_(PosedSource::open(options_)),
+        planner_(options_, {[this] { return trainingSize(); }, [this] { return captureBeforehand(); },
+                            [this] { return downscale(); }, !posed_}) {
     if (posed_) return;
     if (!options_.masks.empty()) masks_.emplace(options_.masks);
     if (masks_ && (liesIn(options_.masks, options_.photos) || liesIn(options_.masks, out("frames")))) {
@@ -95,24 +108,17 @@ class PhotoRun {
          .discard = [this] { models_->discardAdjusted(); },
          .needs = [this](bool) { return estimator_->matchingNeeds().adjusting; },
          .run = [this](bool) { return adjusting(); }},
-        {.name = "georeferencing",
-         .settings = "",
-         .isComplete = has("poses/georeference.json"),
-         .run = [this](bool) { return georeferencing(); }},
+        {.name = "georeferencing", .settings = "", .run = [this](bool) { return georeferencing(); }},
         {.name = "capture",
          .settings = (frames_ && options_.downscale == 0
                           ? fmt::format("{} {} {:.0f}", options_.method, training, options_.costs.raysPerSecond)
                           : std::to_string(downscale())) +
                      " " + describeHoldOut(options_.holdout) + (posed_ ? " " + posed_->digest() : ""),
-         .isComplete =
-             [this] {
-               return has("capture/transforms.json")() &&
-                      (!posed_ || (has("poses/left_out.json")() && has("poses/georeference.json")()));
-             },
+         .isComplete = has("capture/transforms.json"),
          .needs =
              [this](bool) {
-               isCaptureKept_ = false;
-               return trainingNeeds().capture;
+               planner_.expectNewCapture();
+               return planner_.needs().capture;
              },
          .run = [this](bool) { return capture(); }},
         {.name = "train",
@@ -121,19 +127,19 @@ class PhotoRun {
          .discard = [this] { setModelAside(); },
          .needs =
              [this](bool resumes) {
-               isModelKept_ = false;
-               return trainNeeds(resumes);
+               planner_.expectNewModel();
+               return planner_.trainNeeds(resumes);
              },
          .run = [this](bool) { return train(); }},
         {.name = "bake",
          .settings = "",
          .isComplete = has("scene/tileset.json"),
-         .needs = [this](bool) { return trainingNeeds().bake; },
+         .needs = [this](bool) { return planner_.needs().bake; },
          .run = [this](bool) { return bake(); }},
         {.name = "evaluate",
          .settings = "",
          .isComplete = [this] { return !hasHoldOut() || (has("eval.json")() && has("evaluation.html")()); },
-         .needs = [this](bool) { return trainingNeeds().evaluate; },
+         .needs = [this](bool) { return planner_.needs().evaluate; },
          .run = [this](bool) { return evaluate(); }},
         {.name = "report",
          .settings = frames_ ? "" : describeLeftOut(),
@@ -173,7 +179,7 @@ class PhotoRun {
                   "name a folder of JPEG or PNG photos, or a video");
     }
     photosDigest_ = describePhotos();
-    costs_.reset();
+    planner_.photosAreListed();
     if (masks_) masks_->addTo(list_);
     estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, photosDigest_);
   }
@@ -188,6 +194,7 @@ class PhotoRun {
 
   fs::path pairsFile() const { return out("poses/pairs.json"); }
   fs::path leftOutFile() const { return out("poses/left_out.json"); }
+  fs::path georeferenceFile() const { return out("poses/georeference.json"); }
 
   void stopIfInterrupted() const {
     if (options_.interrupted()) throw RunInterrupted();
@@ -244,6 +251,7 @@ class PhotoRun {
         stopIfInterrupted();
         throw;
       } catch (const Error& error) {
+        stopIfInterrupted();
         warn("photos without GPS are only compared with those before and after them: {}", error.what());
       }
     }
@@ -282,6 +290,7 @@ class PhotoRun {
       stopIfInterrupted();
       throw;
     } catch (const Error& error) {
+      stopIfInterrupted();
       warn("models that share photos are not joined: {}", error.what());
       return 0;
     }
@@ -304,6 +313,7 @@ class PhotoRun {
         stopIfInterrupted();
         throw;
       } catch (const Error& error) {
+        stopIfInterrupted();
         warn("no photos could be added: {}", error.what());
       }
     }
@@ -325,7 +335,7 @@ class PhotoRun {
     const SourceCapture source = models_->read();
     std::string reason;
     const auto fit = georeference(source.capture.photos, source.flight, reason);
-    writeGeoreference(out("poses/georeference.json"), fit, reason, source);
+    writeGeoreference(georeferenceFile(), fit, reason, source);
     if (!fit) return {0, "none: " + reason};
     if (fit->isBent()) {
       warn(
@@ -342,6 +352,11 @@ class PhotoRun {
     return chooseDownscale(posed_ ? posed_->trainingSize() : estimator_->trainingSize(), options_.costs);
   }
 
+  TrainingSize trainingSize() {
+    return posed_ ? posed_->trainingSize(downscale()) : estimator_->trainingSize(downscale());
+  }
+  std::optional<Capture> captureBeforehand() const { return posed_ ? posed_->capture() : captureFromTags(list_); }
+
   StageOutcome capture() {
     SourceCapture source = posed_ ? posed_->take(out("poses")) : models_->read();
     std::set<std::string> dropped;
@@ -351,24 +366,11 @@ class PhotoRun {
                                           .threads = options_.threads,
                                           .look = [this] { stopIfInterrupted(); },
                                           .dropped = [&](const std::set<std::string>& names) { dropped = names; }});
-    isCaptureKept_ = true;
-    costs_.reset();
+    planner_.captureIsWritten();
     addLeftOut(leftOutFile(), dropped, "damaged: it ends early, or cannot be decoded");
     const std::string size = downscale() > 1 ? fmt::format(", made smaller by {}", downscale()) : "";
     return {0, fmt::format("{} photos, {} held out{}{}", capture.photos.size(), capture.photosIn(Split::test).size(),
                            capture.geo ? ", georeferenced" : "", size)};
-  }
-
-  // How much of the training the model has behind it.
-  double shareTrained() const {
-    const TrainingProgress done = readTrainingProgress(out("model"));
-    if (done.plannedSteps > 0) return static_cast<double>(done.step) / static_cast<double>(done.plannedSteps);
-    return options_.steps > 0 ? 0 : done.seconds / (60 * options_.minutes);
-  }
-
-  StageNeeds trainNeeds(bool resumes) {
-    const double finest = 1 / (1 + costs().coarserLevels);  // which is trained first
-    return withoutDone(trainingNeeds().train, resumes ? finest * shareTrained() : 0);
   }
 
   // A model that was trained on something else or in another way is kept beside the new one.
@@ -391,9 +393,9 @@ class PhotoRun {
       arguments.insert(arguments.end(), {"--minutes", fmt::format("{}", options_.minutes)});
     }
     inform("to watch the training: tail -f {}", (options_.out / "logs" / "train.log").string());
-    checkRoom({{{"train", trainNeeds(true)}, {"bake", trainingNeeds().bake}}}, options_.out);
+    checkRoom({{{"train", planner_.trainNeeds(true)}, {"bake", planner_.needs().bake}}}, options_.out);
     const StageOutcome outcome = runVerb(options_, "train", arguments);
-    isModelKept_ = true;
+    planner_.modelIsTrained();
     return outcome;
   }
 
@@ -415,10 +417,21 @@ class PhotoRun {
     return outcome;
   }
 
+  // What only the report reads, and folders of earlier versions lack, is not worth training again.
+  void restoreReported() {
+    const bool hasLeftOut = isReadable([&] { readLeftOut(leftOutFile()); });
+    const bool hasGeoreference = isReadable([&] { readGeoreference(georeferenceFile()); });
+    if (hasLeftOut && hasGeoreference) return;
+    if (posed_) {
+      posed_->take(out("poses"));
+      return;
+    }
+    if (!hasLeftOut) writeLeftOut(leftOutFile(), matches_->explain(models_->unplaced(), models_->placedApart()));
+    if (!hasGeoreference) georeferencing();
+  }
+
   StageOutcome report() {
-    // Folders of earlier versions lack it.
-    if (!posed_ && !has("poses/left_out.json")())
-      writeLeftOut(leftOutFile(), matches_->explain(models_->unplaced(), models_->placedApart()));
+    restoreReported();
     const fs::path folder = fs::absolute(options_.photos / "").lexically_normal().parent_path();
     writeFileAtomically(out("report.html"), runReport(options_.out, {.title = folder.filename().string(),
                                                                      .method = options_.method,
@@ -427,36 +440,6 @@ class PhotoRun {
                                                                      .hasEvaluation = hasHoldOut()}));
     inform("to look at the scene: tessera serve {}", out("scene").string());
     return {0, out("report.html").string()};
-  }
-
-  // The capture that is there unless it will be made anew, else what is known of it beforehand.
-  std::optional<Capture> expectedCapture() const {
-    if (isCaptureKept_ && has("capture/transforms.json")()) return readCapture(out("capture"));
-    std::optional<Capture> capture = posed_ ? posed_->capture() : captureFromTags(list_);
-    if (!capture) return capture;
-    // Heights by tags are not precise: rather more blocks than fewer.
-    constexpr double kFiner = 1.1;
-    const double factor = (posed_ ? 1 : kFiner) / downscale();
-    const auto side = [factor](int pixels) { return std::max(1, static_cast<int>(std::lround(factor * pixels))); };
-    for (Camera& camera : capture->cameras) camera = camera.scaledTo(side(camera.width), side(camera.height));
-    return capture;
-  }
-
-  const TrainingCosts& costs() {
-    if (costs_) return *costs_;
-    costs_ = options_.costs;
-    if (!options_.costsOnCapture) return *costs_;
-    try {
-      if (const auto capture = expectedCapture()) costs_ = options_.costsOnCapture(*capture);
-    } catch (const std::exception&) {  // a damaged capture, of which training says so; the plan is only advice
-    }
-    return *costs_;
-  }
-
-  TrainingNeeds trainingNeeds() {
-    TrainingSize size = posed_ ? posed_->trainingSize(downscale()) : estimator_->trainingSize(downscale());
-    if (isModelKept_) size.raysPerSecond = readRaysPerSecond(out("model"));
-    return posed_ || isCaptureKept_ ? planTraining(size, costs()) : planGuessedTraining(size, costs(), options_.costs);
   }
 
   PhotoRunOptions options_;
@@ -468,8 +451,7 @@ class PhotoRun {
   std::unique_ptr<PhotoMatches> matches_;
   std::unique_ptr<PhotoModels> models_;
   std::unique_ptr<RunEstimator> estimator_;
-  bool isCaptureKept_ = true, isModelKept_ = true;  // until the plan asks what new ones take
-  std::optional<TrainingCosts> costs_;
+  TrainingPlanner planner_;
 };
 
 }  // namespace

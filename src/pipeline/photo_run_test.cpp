@@ -83,13 +83,27 @@ TEST_F(PhotoRuns, OfPosedPhotosBeginAtTheCapture) {
   EXPECT_TRUE(contains(run(), "name one of capture, train, bake, evaluate, report"));
 }
 
-TEST_F(PhotoRuns, OfPosedPhotosImportThemAgainIfWhatTheReportNeedsIsLost) {
+TEST_F(PhotoRuns, WriteAgainWhatOnlyTheReportReads) {
   writePosed(9);
-  run();
+  // A program that trains nothing.
+  options_.program = (folder_ / "bin/verbs").string();
+  writeFileAtomically(options_.program,
+                      "#!/bin/sh\ncase $1 in\ntrain) /bin/mkdir -p $5; echo '{}' > $5/manifest.json ;;\n"
+                      "bake) /bin/mkdir -p $5; echo '{}' > $5/tileset.json ;;\n"
+                      "eval) echo '{\"psnr\": 1, \"ssim\": 1, \"exposure\": \"neutral\", \"views\": []}' > $7; echo > "
+                      "$9 ;;\nesac\necho done\n");
+  fs::permissions(options_.program, fs::perms::owner_all);
+  options_.threads = 0;
+  options_.range.until = "";
+  std::string said = run();
+  ASSERT_TRUE(has("report.html")) << said;
   fs::remove(options_.out / "poses/left_out.json");
-  const std::string said = run();
-  EXPECT_FALSE(contains(said, "capture    finished before")) << said;
+  writeFileAtomically(options_.out / "poses/georeference.json", "damaged");
+  options_.range.from = "report";
+  said = run();
+  EXPECT_TRUE(contains(said, "train      finished before")) << said;
   EXPECT_TRUE(has("poses/left_out.json"));
+  EXPECT_NE(readTextFile(options_.out / "poses/georeference.json"), "damaged");
 }
 
 TEST_F(PhotoRuns, PlanForTheBlocksThatTagsAndThenTheCaptureTell) {

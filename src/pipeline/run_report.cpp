@@ -11,6 +11,7 @@
 #include "base/error.h"
 #include "eval/html.h"
 #include "eval/report_style.h"
+#include "import/exif.h"
 #include "photogrammetry/photo_matches.h"
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
@@ -22,6 +23,16 @@ namespace tessera {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// The tags of photos with poses have not been read.
+int findOrientation(const ListedPhoto& photo) {
+  if (photo.tags.orientation != 1) return photo.tags.orientation;
+  try {
+    return decodePhotoTags(readPhotoHead(photo.file)).orientation;
+  } catch (const Error&) {
+    return 1;
+  }
+}
 
 constexpr char kRunReportStyle[] = R"css(
 main { max-width: 1200px; }
@@ -170,7 +181,7 @@ class RunPage {
       // The first, the last, and some between them.
       const size_t index = count > 1 ? i * (input_.photos.size() - 1) / (count - 1) : 0;
       const ListedPhoto& photo = input_.photos[index];
-      const auto thumbnail = makeThumbnail(photo.file, photo.tags.orientation, kThumbnailSide);
+      const auto thumbnail = makeThumbnail(photo.file, findOrientation(photo), kThumbnailSide);
       if (!thumbnail) continue;
       const std::string name = escapedHtml(photo.name);
       html += fmt::format(

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "base/child_process.h"
 #include "base/error.h"
 #include "base/log.h"
 #include "base/memory.h"
@@ -29,6 +30,12 @@ struct Record {
 };
 
 // Returns what run.json of an earlier run says; nothing if the file is missing or damaged.
+// Whether anybody still reads it does not matter: the terminal may have been closed.
+void say(const std::string& line) {
+  std::fwrite(line.data(), 1, line.size(), stdout);
+  std::fflush(stdout);
+}
+
 Json readRun(const fs::path& file) {
   constexpr uint64_t kMaxBytes = 1 << 20;
   std::error_code status;
@@ -216,7 +223,7 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
   if (remaining.interrupted) done.push_back(*remaining.interrupted);
   for (const Record& before : done) plan.entries.push_back({"", {before.seconds, before.peakBytes, 0}});
   record(plan.total());
-  if (remaining.first == stages.size()) {  // the next call without flags is for those of this one all the same
+  if (remaining.first == remaining.end) {  // the next call without flags is for those of this one all the same
     Json before = readRun(file);
     if (before.is_object()) {
       before["request"] = request.command;
@@ -225,7 +232,7 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
     }
   }
   for (size_t i = 0; i < remaining.first; ++i) {
-    fmt::print("{:<10} finished before: {}\n", stages[i].name, remaining.known[i].summary);
+    say(fmt::format("{:<10} finished before: {}\n", stages[i].name, remaining.known[i].summary));
     run["stages"].push_back(toJson(stages[i].name, remaining.known[i]));
   }
   for (size_t i = remaining.first; i < remaining.end; ++i) {
@@ -253,11 +260,12 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
     if (i > remaining.first && needs.seconds > kLongSeconds)
       inform("{} will take about {}", stage.name, describeDuration(needs.seconds));
     const bool measuresPeak = restartPeakResidentBytes();
+    takePeakOfChildren();
     const auto start = std::chrono::steady_clock::now();
     const auto count = [&](int64_t peakOfPrograms) {
       result.seconds = before.seconds + std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      result.peakBytes =
-          std::max({before.peakBytes, peakOfPrograms, measuresPeak ? peakResidentBytes() : residentBytes()});
+      result.peakBytes = std::max({before.peakBytes, peakOfPrograms, takePeakOfChildren(),
+                                   measuresPeak ? peakResidentBytes() : residentBytes()});
     };
     StageOutcome outcome;
     try {
@@ -280,13 +288,11 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
       later.entries.push_back({stage.name, {result.seconds, result.peakBytes, 0}});
       record(later.total());
     }
-    fmt::print("{:<10} {}: {}{}\n", stage.name, describeClock(result.seconds), result.summary,
-               left > kLongSeconds ? fmt::format(" (about {} left)", describeDuration(left)) : "");
-    std::fflush(stdout);
     run["stages"].push_back(toJson(stage.name, result));
     write(run, file);
+    say(fmt::format("{:<10} {}: {}{}\n", stage.name, describeClock(result.seconds), result.summary,
+                    left > kLongSeconds ? fmt::format(" (about {} left)", describeDuration(left)) : ""));
   }
-  std::fflush(stdout);
   if (run.erase("begun_from") > 0 && remaining.first < remaining.end) write(run, file);
 }
 

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <thread>
 
+#include "base/child_process.h"
 #include "base/error.h"
 #include "base/testing/temporary_folder.h"
 
@@ -184,6 +185,25 @@ TEST_F(Stages, RunInTheRangeAskedFor) {
   EXPECT_EQ(run({"", "", ""}), "three ") << "what lies behind the range is kept";
   EXPECT_EQ(run({"", "", ""}, {.from = "two"}), "two three ");
   EXPECT_EQ(run({"", "", ""}, {.from = "four"}), "failed");
+}
+
+TEST_F(Stages, RecordTheMemoryOfProgramsAlsoIfTheyFail) {
+  const auto runs = [](bool fails) {
+    return Stage{
+        .name = "one", .run = [fails](bool) {
+          ChildProcess process;
+          const bool begins = process.start({"dd", "if=/dev/zero", "of=/dev/null", "bs=64M", "count=1"}).empty();
+          if (begins) process.wait();
+          if (fails || !begins) throw Error("one", "", "fails", "run again");
+          return StageOutcome{};
+        }};
+  };
+  EXPECT_THROW(runStages(folder_.path(), {"test"}, {runs(true)}, {}), Error);
+  const Stage quick{.name = "one", .run = [](bool) { return StageOutcome{}; }};
+  runStages(folder_.path(), {"test"}, {quick}, {});
+  const auto records = readStageRecords(folder_.path());
+  ASSERT_EQ(records.size(), 1u);
+  EXPECT_GT(records[0].peakBytes, int64_t{64} << 20);
 }
 
 TEST_F(Stages, ReadWhatIsRecordedOfThoseBeforeThem) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 
 #include "base/error.h"
 #include "base/image_io.h"
@@ -12,7 +13,7 @@ namespace {
 constexpr int kThumbnailQuality = 80;
 
 // JPEG has no alpha.
-ImageU8 withoutAlpha(const ImageU8& image) {
+ImageU8 withoutAlpha(ImageU8 image) {
   if (image.channels != 4) return image;
   ImageU8 opaque(image.width, image.height, 3);
   for (size_t i = 0; i < image.pixelCount(); ++i)
@@ -47,6 +48,8 @@ std::optional<Thumbnail> makeThumbnail(const fs::path& photo, int orientation, i
     const ImageU8 upright = turnUpright(downscaleByArea(image, scaled(image.width), scaled(image.height)), orientation);
     return Thumbnail{upright.width, upright.height, encodeJpeg(upright, kThumbnailQuality)};
   } catch (const Error&) {
+    return std::nullopt;
+  } catch (const std::bad_alloc&) {
     return std::nullopt;
   }
 }

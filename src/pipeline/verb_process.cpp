@@ -1,10 +1,29 @@
 #include "pipeline/verb_process.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+
 #include "base/child_process.h"
 #include "base/error.h"
+#include "base/log.h"
 #include "pipeline/echoed_line.h"
 
 namespace tessera {
+namespace {
+
+constexpr std::array kInterruptions = {SIGINT, SIGTERM, SIGHUP};
+
+// Whether a verb says that it has ended for such a signal, or was ended by it.
+bool endsBySignal(const std::string& end, int signal) {
+  constexpr int kStatus = 128;  // interruptedStatus
+  return end == fmt::format("ended with status {}", kStatus + signal) ||
+         end == fmt::format("was ended by signal {}", signal);
+}
+
+}  // namespace
 
 StageOutcome runVerb(const PhotoRunOptions& options, const std::string& verb, std::vector<std::string> arguments) {
   const fs::path log = options.out / "logs" / (verb + ".log");
@@ -29,7 +48,13 @@ StageOutcome runVerb(const PhotoRunOptions& options, const std::string& verb, st
   echo.clear();
   const std::string end = process.wait();
   if (!end.empty()) {
-    if (options.interrupted()) throw RunInterrupted();
+    if (options.interrupted()) {
+      // What else went wrong is lost with the interruption, such as a checkpoint for which there was no space.
+      const bool isInterruption = std::any_of(kInterruptions.begin(), kInterruptions.end(),
+                                              [&](int signal) { return endsBySignal(end, signal); });
+      if (!isInterruption) warn("tessera {} {}: {}", verb, end, lastLine());
+      throw RunInterrupted();
+    }
     throw Error("tessera " + verb, "", end + ": " + lastLine(), "see " + log.string() + "; run again to go on");
   }
   return {process.peakBytes(), lastLine()};

@@ -18,8 +18,9 @@ std::optional<ExposureResponse> fitExposureResponse(std::span<const double> expo
                                                     std::span<const float> logGains) {
   CHECK(logGains.size() == 3 * exposures.size());
   constexpr size_t kLeastPhotos = 8;
-  constexpr double kLeastDeviation = 0.05;  // stops
-  constexpr double kLeastExplained = 0.5;   // of the variance
+  constexpr double kLeastDeviation = 0.05;                  // stops
+  constexpr double kLeastExplained = 0.5;                   // of the variance
+  constexpr double kLeastSlope = -0.5, kGreatestSlope = 2;  // what more light does to a photo, with some error
   std::vector<size_t> known;
   for (const int photo : trained)
     if (exposures[static_cast<size_t>(photo)] != 0) known.push_back(static_cast<size_t>(photo));
@@ -38,6 +39,7 @@ std::optional<ExposureResponse> fitExposureResponse(std::span<const double> expo
     for (const size_t i : known) mean += double{logGains[3 * i + c]} / n;
     for (const size_t i : known) products += (exposures[i] - meanExposure) * (logGains[3 * i + c] - mean);
     const double slope = products / squares;
+    if (!(slope >= kLeastSlope && slope <= kGreatestSlope)) return std::nullopt;
     response.slope[c] = static_cast<float>(slope);
     response.offset[c] = static_cast<float>(mean - slope * meanExposure);
     for (const size_t i : known) {

@@ -20,7 +20,8 @@ struct ExposureResponse {
 
 // Fits the response to the log2 gains [photos][3] of the photos `trained`. `exposures`: Photo::exposure of each photo.
 // Returns nothing if the exposures of fewer than eight of them are known, if these hardly differ, or if they explain
-// less than half of the variance of the gains: then something else, such as clouds, has changed the light.
+// less than half of the variance of the gains, or with a slope that light does not have: then something else, such as
+// clouds, has changed the light.
 std::optional<ExposureResponse> fitExposureResponse(std::span<const double> exposures, std::span<const int> trained,
                                                     std::span<const float> logGains);
 

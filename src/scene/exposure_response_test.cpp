@@ -65,6 +65,13 @@ TEST(ExposureResponse, IsUsedOnlyIfItExplainsMostOfTheGains) {
   EXPECT_FALSE(fit(capture, std::vector<float>(120, 0.0f)).has_value());
 }
 
+TEST(ExposureResponse, HasASlopeThatLightHas) {
+  const Capture capture = photos(40);
+  EXPECT_TRUE(fit(capture, gains(capture, 1.5, 0)).has_value());
+  EXPECT_FALSE(fit(capture, gains(capture, 2.5, 0)).has_value());
+  EXPECT_FALSE(fit(capture, gains(capture, -1, 0)).has_value()) << "photos that collected more light are darker";
+}
+
 TEST(ExposureResponse, NeedsPhotosWhoseExposuresAreKnownAndDiffer) {
   const Capture few = photos(8);
   EXPECT_FALSE(fit(few, gains(few, 0.45, 0)).has_value()) << "seven are trained on";
