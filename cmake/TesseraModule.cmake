@@ -40,6 +40,9 @@ function(tessera_simd_targets target)
   target_link_libraries(${target} PRIVATE PkgConfig::HWY)
   # Targets that speed up these kernels no further than AVX3 would only double the build time.
   target_compile_definitions(${target} PRIVATE "HWY_DISABLED_TARGETS=(HWY_AVX3_DL)")
+  if(TESSERA_FUZZERS)  # which run decoders: the oldest set will do
+    target_compile_definitions(${target} PRIVATE HWY_COMPILE_ONLY_STATIC)
+  endif()
 endfunction()
 
 # tessera_representation(NAME
