@@ -20,7 +20,7 @@ struct ColmapSettings {
   std::string threadsText() const { return threads > 0 ? std::to_string(threads) : "-1"; }
 };
 
-// That something else has ended the program, or a lack of memory or disk: no result of it, but to be run again.
+// That something else has ended the program, or a lack of memory or disk space: no result of it, but to be run again.
 class ColmapKilled : public Error {
  public:
   using Error::Error;
@@ -33,8 +33,8 @@ class ColmapProgram {
   explicit ColmapProgram(fs::path log, std::string program = "colmap");
 
   // Runs a command, such as {"mapper", "--output_path", "sparse"}. `watch` is called now and then while it runs.
-  // Throws ColmapKilled if it was ended from outside or memory or disk ran out, and else Error with its last words if it fails.
-  // That it reports success means little: callers look at what it wrote.
+  // Throws ColmapKilled if it was ended from outside or memory or disk ran out, and else Error with its last words if
+  // it fails. That it reports success means little: callers look at what it wrote.
   void run(std::vector<std::string> arguments, const std::function<void()>& watch = {});
 
   int64_t peakBytes() const { return peakBytes_; }  // of all runs

@@ -29,8 +29,8 @@ class PosedSource {
   const TrainingSize& trainingSize() const { return size_; }
   bool holdsOut() const { return size_.heldOut > 0; }  // whether photos are held out, if none is dropped at import
   TrainingSize trainingSize(int downscale) const;      // in the folder of the run
-  // Until the source is taken: the photos that can be read, with Z up as import turns it if no tags tell more. Of
-  // observations, only the points count.
+  // Returns, until the source is taken, the photos that can be read, with Z up as import turns it if no tags tell more.
+  // The observations still have the source's indices of photos.
   Capture capture() const;
 
  private:
