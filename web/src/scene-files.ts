@@ -1,6 +1,8 @@
 // The files of a scene: from a server, or from a folder that the user has chosen.
 import { SceneError } from './scene-error';
 
+const kLongestSilence = 60_000; // ms without a byte, after which a file is given up, to be asked for again
+
 export type ContentFile = Uint8Array<ArrayBuffer>;
 
 export interface SceneFiles {
@@ -77,8 +79,19 @@ export class ChosenFiles implements SceneFiles {
 export async function fetchFile(
   url: string, name: string, maximum: number, signal?: AbortSignal, ifMissing = 'reload the page, as the scene may have been baked again',
 ): Promise<ContentFile> {
+  // A connection may end without a word, as on a change of networks.
+  const stopped = new AbortController();
+  const stop = () => stopped.abort(signal?.reason);
+  let timer: ReturnType<typeof setTimeout> | undefined;
+  const wait = () => {
+    clearTimeout(timer);
+    timer = setTimeout(() => stopped.abort(), kLongestSilence);
+  };
   try {
-    const answer = await fetch(url, { signal });
+    signal?.throwIfAborted();
+    signal?.addEventListener('abort', stop);
+    wait();
+    const answer = await fetch(url, { signal: stopped.signal });
     if (!answer.ok) {
       const remedy = answer.status === 404 ? ifMissing : 'try again later';
       throw new SceneError(name, '', `the server answered ${answer.status} ${answer.statusText}`.trim(), remedy);
@@ -87,6 +100,7 @@ export async function fetchFile(
     let bytes = 0;
     const reader = answer.body!.getReader();
     for (let next = await reader.read(); !next.done; next = await reader.read()) {
+      wait();
       bytes += next.value.length;
       if (bytes > maximum) {
         await reader.cancel();
@@ -104,5 +118,8 @@ export async function fetchFile(
   } catch (error) {
     if (error instanceof SceneError || signal?.aborted) throw error;
     throw new SceneError(name, '', 'could not be fetched', 'check that the server is running and the network is available');
+  } finally {
+    clearTimeout(timer);
+    signal?.removeEventListener('abort', stop);
   }
 }

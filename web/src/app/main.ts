@@ -44,6 +44,7 @@ async function start(): Promise<void> {
   document.title = city.name === '' ? 'tessera' : `${city.name} · tessera`;
   const viewer = new Viewer(canvas, renderer, city);
   const shortcuts = new Shortcuts();
+  shortcuts.areSuspended = () => viewer.isPaused;
   const toolbar = new Toolbar(document.body, shortcuts);
   addNavigationTools(viewer, toolbar, shortcuts);
   addMeasuring(viewer, toolbar, shortcuts);

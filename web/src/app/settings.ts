@@ -18,6 +18,10 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
   const levels = Array.from({ length: city.tileset.levels }, (_, level): [string, number] => [level === 0 ? 'All' : `Level ${level} and coarser`, level]);
   const { modes } = city.shows;
   const featureLevel = makeFeatureLevelChoice(viewer, changed((level) => scenes.forEach((scene) => (scene.featureLevel = level))));
+  const lens = slider('Field of view', 15, 100, camera.fov, 1, (x) => `${x}°`, changed((x) => {
+    camera.fov = x;
+    camera.updateProjectionMatrix();
+  }));
   const panel = element(
     'div', '',
     choice('Show', modes.map((mode): [string, ShownMode<DisplayMode>] => [mode.label, mode]),
@@ -34,12 +38,14 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
     choice('Pixels', kResolutions, changed((share) => (resolution.fixed = share))),
     slider('Graphics memory', 6, 13, Math.log2(city.stream.gpuBytes / 2 ** 20), 0.5, (x) => `${Math.round(2 ** x)} MiB`,
       changed((x) => (viewer.gpuBytes = 2 ** x * 2 ** 20))),
-    slider('Field of view', 15, 100, camera.fov, 1, (x) => `${x}°`, changed((x) => {
-      camera.fov = x;
-      camera.updateProjectionMatrix();
-    })),
+    lens,
   );
-  toolbar.add({ name: 'Settings', key: 'c', icon: 'sliders', panel });
+  // Addresses and bookmarks set the lens, too.
+  const opened = () => {
+    lens.querySelector('input')!.valueAsNumber = camera.fov;
+    lens.querySelector('output')!.textContent = `${Math.round(camera.fov)}°`;
+  };
+  toolbar.add({ name: 'Settings', key: 'c', icon: 'sliders', panel, opened });
 }
 
 // The feature level that feature-level modes show.

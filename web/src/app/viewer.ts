@@ -92,7 +92,7 @@ export class Viewer {
   addScene(scene: TesseraScene): void {
     const { city } = this;
     Object.assign(scene.selection, city.selection);
-    Object.assign(scene, { display: city.display, onError: city.onError, resolutionScale: city.resolutionScale, showsBackgroundBlock: false });
+    Object.assign(scene, { display: city.display, featureLevel: city.featureLevel, onError: city.onError, resolutionScale: city.resolutionScale, showsBackgroundBlock: false });
     this.scenes.push(scene);
     this.world.add(scene);
     this.changedScenes();
@@ -247,6 +247,7 @@ export class Viewer {
 
   private resize(): void {
     if (this.paused || this.renderer.xr.isPresenting) return;
+    if (innerWidth === 0 || innerHeight === 0) return; // a frame that is not shown yet
     this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
     this.renderer.setSize(innerWidth, innerHeight, false);
     this.camera.aspect = innerWidth / innerHeight;

@@ -420,7 +420,7 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
       this.statistics.pageBytes -= entry.gpuBytes;
     }
     entry.resident = undefined;
-    if (entry.state === 'decoding') return; // startDecodes drops it when its worker has finished
+    if (entry.state === 'decoding') return; // decode drops it when its worker has finished
     this.forget(tile, entry);
   }
 

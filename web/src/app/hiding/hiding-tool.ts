@@ -26,7 +26,7 @@ export function addHiding(viewer: Viewer, parts: HiddenParts, toolbar: Toolbar, 
   });
   shortcuts.describe('Delete', 'Delete the selected hidden part');
   addEventListener('keydown', ({ key, target }) => {
-    if (key === 'Delete' && parts.selected && !isTyping(target)) parts.remove(parts.selected);
+    if (key === 'Delete' && parts.selected && !viewer.isPaused && !isTyping(target)) parts.remove(parts.selected);
   });
   // Precedes the selection of models by clicks.
   viewer.onClick.unshift((event) => {

@@ -199,7 +199,7 @@ export class Measuring {
 
   private listen(): void {
     addEventListener('keydown', (event) => {
-      if (!this.isOpen || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+      if (!this.isOpen || this.viewer.isPaused || event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
       if (event.key === 'Backspace') this.takeBack();
       else if (event.key === 'Enter' && !(event.target instanceof HTMLButtonElement)) this.end();
       else return;

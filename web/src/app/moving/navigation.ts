@@ -99,6 +99,7 @@ export class Navigation {
   // Sets the view immediately. If it looks upwards in map mode, the mode changes to orbit.
   set look({ eye, target }: Look) {
     this.flight = undefined;
+    this.stopInertia();
     this.leaveMapFor({ eye, target });
     this.camera.position.copy(eye);
     this.orbit.target.copy(target);
@@ -108,8 +109,19 @@ export class Navigation {
   }
 
   flyTo(to: Look): void {
+    this.stopInertia();
     this.leaveMapFor(to);
     this.flight = { from: this.look, to: { eye: to.eye.clone(), target: to.target.clone() }, begin: performance.now() };
+  }
+
+  // OrbitControls goes on after a drag, and would do so after a flight.
+  private stopInertia(): void {
+    const { eye, target } = this.look;
+    this.orbit.enableDamping = false;
+    this.orbit.update();
+    this.orbit.enableDamping = true;
+    this.camera.position.copy(eye);
+    this.orbit.target.copy(target);
   }
 
   private leaveMapFor({ eye, target }: Look): void {
@@ -163,8 +175,13 @@ export class Navigation {
     const { from, to, begin } = this.flight;
     const passed = Math.min((performance.now() - begin) / kFlight, 1);
     const smooth = passed * passed * (3 - 2 * passed);
-    this.camera.position.lerpVectors(from.eye, to.eye, smooth);
-    this.orbit.target.lerpVectors(from.target, to.target, smooth);
+    // At its end the view is `to`, wherever the flight began.
+    this.camera.position.copy(to.eye);
+    this.orbit.target.copy(to.target);
+    if (passed < 1) {
+      this.camera.position.lerpVectors(from.eye, to.eye, smooth);
+      this.orbit.target.lerpVectors(from.target, to.target, smooth);
+    }
     this.camera.lookAt(this.orbit.target);
     this.moved = true;
     if (passed === 1) this.flight = undefined;
@@ -220,7 +237,10 @@ export class Navigation {
       if (ctrlKey || metaKey || altKey || isTyping(target) || target instanceof HTMLInputElement) return;
       this.keys.add(code);
     });
-    addEventListener('keyup', ({ code }) => this.keys.delete(code));
+    addEventListener('keyup', ({ code }) => {
+      this.keys.delete(code);
+      if (code.startsWith('Meta')) this.keys.clear(); // macOS does not tell of keys that were released meanwhile
+    });
     addEventListener('blur', () => this.keys.clear());
     this.canvas.addEventListener('dblclick', (event) => {
       if (this.isPointing) return;
@@ -230,8 +250,8 @@ export class Navigation {
     this.canvas.addEventListener('pointerdown', ({ pointerId, pointerType }) => {
       if (this.current !== 'fly' || this.isSuspended) return;
       if (pointerType === 'mouse' && !this.isPointing && document.pointerLockElement !== this.canvas) {
-        // If the pointer cannot be locked, dragging turns the view.
-        void Promise.resolve(this.canvas.requestPointerLock()).catch(() => {});
+        // If the pointer cannot be locked, as on an iPad, dragging turns the view.
+        void Promise.resolve(this.canvas.requestPointerLock?.()).catch(() => {});
       }
       this.looking ??= pointerId;
     });

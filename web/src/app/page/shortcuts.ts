@@ -7,11 +7,12 @@ export interface Shortcut {
 
 export class Shortcuts {
   readonly list: Shortcut[] = [];
+  areSuspended: () => boolean = () => false; // the keys do nothing
   private readonly actions = new Map<string, () => void>();
 
   constructor() {
     addEventListener('keydown', (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target)) return;
+      if (event.ctrlKey || event.metaKey || event.altKey || isTyping(event.target) || this.areSuspended()) return;
       const action = this.actions.get(event.key.toLowerCase());
       if (!action) return;
       event.preventDefault();

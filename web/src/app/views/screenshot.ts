@@ -115,6 +115,9 @@ export function addScreenshot(viewer: Viewer, toolbar: Toolbar): void {
     presets.append(button);
   }
   choose(1920, 1080);
+  addEventListener('keydown', ({ key }) => {
+    if (key === 'Escape' && !cancel.hidden) cancel.click();
+  });
   take.addEventListener('click', async () => {
     if (!width.reportValidity() || !height.reportValidity()) return;
     const ending = new AbortController();

@@ -2,6 +2,7 @@
 import * as THREE from 'three';
 import { TesseraScene } from '../../scene';
 import { SceneError } from '../../scene-error';
+import { ServedFiles } from '../../scene-files';
 import type { HiddenParts } from '../hiding/hidden-parts';
 import { loadModel } from '../models/load-model';
 import { baseName, type ModelFile } from '../models/model-files';
@@ -213,5 +214,5 @@ export class Worlds {
 
 function isSameScene(scene: TesseraScene, { url }: WorldScene, address: string): boolean {
   const sceneAddress = url === '' ? undefined : resolved(url, address);
-  return sceneAddress !== undefined && new URL('.', scene.files.name).href === new URL('.', sceneAddress.endsWith('.json') ? sceneAddress : `${sceneAddress.replace(/\/$/, '')}/`).href;
+  return sceneAddress !== undefined && new ServedFiles(sceneAddress).name === scene.files.name;
 }
