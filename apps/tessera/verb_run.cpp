@@ -111,7 +111,10 @@ void addRunVerb(CLI::App& app) {
       ->capture_default_str()
       ->needs(served);
   verb->callback([verb, options, device, serving, served] {
-    if (served->count() > 0) requireViewer(serving->viewer);
+    if (served->count() > 0) {
+      requireViewer(serving->viewer);
+      requireFreeAddress(serving->server);
+    }
     options->device = device->kind;
     options->threads = device->threads;
     adoptEarlierFlags(*options, givenFlags(*verb));

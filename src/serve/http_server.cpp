@@ -23,7 +23,8 @@ namespace beast = boost::beast;
 namespace http = beast::http;
 using asio::ip::tcp;
 
-constexpr size_t kMaxHeader = 8192, kChunk = size_t{1} << 16;
+constexpr size_t kMaxHeader = 32768;  // with the cookies that other servers of this host have set
+constexpr size_t kChunk = size_t{1} << 16, kDiscardedAtOnce = 4096;
 constexpr size_t kMaxCompressed = size_t{32} << 20;  // bytes of compressed text in the cache
 constexpr int kMaxUnsent = 1 << 17;                  // bytes that the system buffers for one client
 constexpr size_t kMaxDiscarded = size_t{1} << 20;
@@ -119,7 +120,8 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     SiteAnswer refused;
     refused.status = status;
     refused.headers = {{"Content-Type", "text/plain; charset=utf-8"}};
-    refused.body = "the request is malformed\n";
+    refused.body = status == 431 ? "the headers of the request are too large; delete the cookies of this host\n"
+                                 : "the request is malformed\n";
     refused.length = refused.body.size();
     send(std::move(refused), 11, false);
   }
@@ -196,7 +198,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
 
   void discard() {
     buffer_.clear();
-    stream_.async_read_some(buffer_.prepare(kMaxHeader),
+    stream_.async_read_some(buffer_.prepare(kDiscardedAtOnce),
                             [self = shared_from_this()](beast::error_code error, size_t bytes) {
                               if (!self->open_) return;
                               self->discarded_ += bytes;
@@ -208,7 +210,7 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   beast::tcp_stream stream_;
   State& state_;
   std::list<std::shared_ptr<Connection>>::iterator place_;
-  beast::flat_static_buffer<kMaxHeader> buffer_;
+  beast::flat_buffer buffer_{kMaxHeader};
   std::optional<http::request_parser<http::empty_body>> parser_;
   SiteAnswer answer_;
   Compressor::Body compressed_;
@@ -241,9 +243,10 @@ void HttpServer::State::accept() {
   });
 }
 
-HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& settings)
-    : state_(std::make_unique<State>(site, settings)) {
-  raiseFileLimit();
+namespace {
+
+// Throws Error if the address is invalid or in use.
+void listenOn(tcp::acceptor& acceptor, const HttpServerSettings& settings) {
   const std::string place = fmt::format("{}:{}", settings.address, settings.port);
   beast::error_code error;
   const auto address = asio::ip::make_address(settings.address, error);
@@ -252,7 +255,6 @@ HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& setting
   };
   const char* another = "pass one with --address, such as 127.0.0.1, or 0.0.0.0 for all of this machine's addresses";
   if (error) refuse("is not an IP address", another);
-  tcp::acceptor& acceptor = state_->acceptor;
   const tcp::endpoint endpoint(address, settings.port);
   acceptor.open(endpoint.protocol(), error);
   if (!error) acceptor.set_option(asio::socket_base::reuse_address(true), error);
@@ -263,6 +265,20 @@ HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& setting
   }
   if (error == beast::errc::address_not_available) refuse("is not an address of this machine", another);
   if (error) refuse("cannot be bound: " + error.message(), "choose another --port or --address");
+}
+
+}  // namespace
+
+HttpServer::HttpServer(const StaticSite& site, const HttpServerSettings& settings)
+    : state_(std::make_unique<State>(site, settings)) {
+  raiseFileLimit();
+  listenOn(state_->acceptor, settings);
+}
+
+void requireFreeAddress(const HttpServerSettings& settings) {
+  asio::io_context context;
+  tcp::acceptor acceptor(context);
+  listenOn(acceptor, settings);
 }
 
 HttpServer::~HttpServer() = default;

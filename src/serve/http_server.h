@@ -17,11 +17,14 @@ struct HttpServerSettings {
   std::string address = "127.0.0.1";
   uint16_t port = 8080;          // 0: any free port
   size_t maxConnections = 2048;  // beyond this number, the connection that has been idle longest is closed
-  std::chrono::milliseconds requestTime{15000};  // to receive a whole request
-  std::chrono::milliseconds idleTime{60000};     // between requests
+  std::chrono::milliseconds requestTime{15000};  // to receive the first request of a connection
+  std::chrono::milliseconds idleTime{60000};     // to receive another one, after the answer to the one before it
   std::chrono::milliseconds sendTime{30000};     // for a client to receive the next 64 KiB
   std::chrono::milliseconds lingerTime{2000};  // to let a client receive the last answer, while its input is discarded
 };
+
+// Throws Error if the address is invalid or in use, for callers that will listen on it much later.
+void requireFreeAddress(const HttpServerSettings& settings);
 
 class HttpServer {
  public:

@@ -259,6 +259,25 @@ TEST_F(HttpServerTest, SurvivesMalformedRequests) {
   EXPECT_EQ(extractBody(exchange(get("/small.txt"))), "hello");
 }
 
+TEST_F(HttpServerTest, TakesTheCookiesOfOtherServersOfItsHost) {
+  start();
+  EXPECT_TRUE(exchange(get("/small.txt", "Cookie: " + std::string(20000, 'c') + "\r\n")).starts_with("HTTP/1.1 200 "));
+  const std::string refused = exchange(get("/small.txt", "Cookie: " + std::string(40000, 'c') + "\r\n"));
+  EXPECT_TRUE(refused.starts_with("HTTP/1.1 431 ")) << refused;
+  EXPECT_NE(refused.find("delete the cookies"), std::string::npos) << refused;
+}
+
+TEST_F(HttpServerTest, IsRefusedAnAddressBeforeItIsNeeded) {
+  start();
+  HttpServerSettings settings;
+  settings.port = server_->port();
+  EXPECT_THROW(requireFreeAddress(settings), Error);
+  settings.port = 0;
+  EXPECT_NO_THROW(requireFreeAddress(settings));
+  settings.address = "localhost";
+  EXPECT_THROW(requireFreeAddress(settings), Error);
+}
+
 TEST_F(HttpServerTest, RequiresExactlyOneHost) {
   start();
   EXPECT_TRUE(exchange("GET /small.txt HTTP/1.1\r\n\r\n").starts_with("HTTP/1.1 400 "));

@@ -42,8 +42,8 @@ Kind fileKind(const fs::path& file) {
   return match == std::end(kKinds) ? Kind{"", "application/octet-stream", false} : *match;
 }
 
-// Recognises "name-0123456789abcdef.glb", and "name-aB3_x9Zq.js" among the viewer's own files.
-bool holdsDigest(const fs::path& file) {
+// Recognises "name-0123456789abcdef.glb", and "name-aB3_x9Zq.js" in the folder `assets` of the viewer's own files.
+bool holdsDigest(const fs::path& file, bool isOfViewer) {
   const std::string stem = file.stem().string();
   const size_t dash = stem.rfind('-');
   if (dash == std::string::npos) return false;
@@ -51,7 +51,11 @@ bool holdsDigest(const fs::path& file) {
   if (file.extension() == ".glb" || file.parent_path().filename() == "resources") {
     return digest.size() == 16 && digest.find_first_not_of("0123456789abcdef") == std::string::npos;
   }
-  return digest.size() == 8 && file.parent_path().filename() == "assets";
+  return isOfViewer && digest.size() == 8 && file.parent_path().filename() == "assets";
+}
+
+std::string sitePrefix(const SiteFolder& folder) {
+  return folder.name.empty() ? "/" : "/" + folder.name + "/";
 }
 
 SiteAnswer plain(int status, const std::string& reason) {
@@ -83,16 +87,10 @@ StaticSite::StaticSite(std::vector<SiteFolder> folders, std::vector<std::string>
             [](const SiteFolder& a, const SiteFolder& b) { return a.name.size() > b.name.size(); });
 }
 
-// The path has already been checked by pathOfTarget; links may still lead outside.
-SiteFile::Opening StaticSite::fileAt(const std::string& path) const {
-  for (const SiteFolder& one : folders_) {
-    const std::string prefix = one.name.empty() ? "/" : "/" + one.name + "/";
-    if (!path.starts_with(prefix)) continue;
-    std::string rest = path.substr(prefix.size());
-    if (rest.empty() && one.name.empty()) rest = "index.html";
-    return SiteFile::open(one.folder, rest);
-  }
-  return {};
+const SiteFolder* StaticSite::findFolder(const std::string& path) const {
+  const auto one = std::find_if(folders_.begin(), folders_.end(),
+                                [&](const SiteFolder& folder) { return path.starts_with(sitePrefix(folder)); });
+  return one == folders_.end() ? nullptr : &*one;
 }
 
 SiteAnswer StaticSite::answer(const SiteRequest& request) const {
@@ -119,16 +117,24 @@ SiteAnswer StaticSite::answer(const SiteRequest& request) const {
     return finish(std::move(onward));
   }
   const auto path = pathOfTarget(request.target);
-  const SiteFile::Opening opening = path ? fileAt(*path) : SiteFile::Opening();
+  const SiteFolder* folder = path ? findFolder(*path) : nullptr;
+  SiteFile::Opening opening;
+  if (folder != nullptr) {
+    // The path has already been checked by pathOfTarget; links may still lead outside.
+    const std::string rest = path->substr(sitePrefix(*folder).size());
+    opening = SiteFile::open(folder->folder, rest.empty() && folder->name.empty() ? "index.html" : rest);
+  }
   if (opening.isBusy) return finish(plain(503, "too many files are open"));
   const auto& file = opening.file;
   if (!file) return finish(plain(404, "there is no such file"));
   const uint64_t bytes = file->bytes();
   const Kind kind = fileKind(file->path());
   std::string tag = file->tag();
-  answer.headers = {{"Content-Type", kind.type},
-                    {"Cache-Control", holdsDigest(file->path()) ? "public, max-age=31536000, immutable" : "no-cache"},
-                    {"Accept-Ranges", "bytes"}};
+  answer.headers = {
+      {"Content-Type", kind.type},
+      {"Cache-Control",
+       holdsDigest(file->path(), folder->name.empty()) ? "public, max-age=31536000, immutable" : "no-cache"},
+      {"Accept-Ranges", "bytes"}};
   const bool compressible = kind.isText && bytes >= kSmallestCompressed && bytes <= kLargestCompressed;
   if (compressible) answer.headers.emplace_back("Vary", "Accept-Encoding");
   const bool asksForPart = !request.range.empty() && (request.ifRange.empty() || request.ifRange == tag);

@@ -46,7 +46,7 @@ class StaticSite {
   SiteAnswer answer(const SiteRequest& request) const;
 
  private:
-  SiteFile::Opening fileAt(const std::string& path) const;
+  const SiteFolder* findFolder(const std::string& path) const;  // null: none is served there
 
   std::vector<SiteFolder> folders_;
   std::vector<std::string> hosts_;

@@ -22,6 +22,7 @@ class StaticSiteTest : public testing::Test {
     write("viewer/assets/index-aB3_x9Zq.js", std::string(5000, 'x'));
     write("scene/tileset.json", "{\"asset\":" + std::string(5000, ' ') + "{}}");
     write("scene/tiles/L0/a-0123456789abcdef.glb", "0123456789");
+    write("scene/assets/bus-mesh2024.gltf", "{}");
     write("scene/.hidden", "secret");
     write("secret.txt", "secret");
     write("scene-beside/secret.txt", "secret");
@@ -94,6 +95,7 @@ TEST_F(StaticSiteTest, MarksContentAddressedFilesAsImmutable) {
   EXPECT_EQ(findHeader(get("/scene/tiles/L0/a-0123456789abcdef.glb"), "Cache-Control"),
             "public, max-age=31536000, immutable");
   EXPECT_EQ(findHeader(get("/assets/index-aB3_x9Zq.js"), "Cache-Control"), "public, max-age=31536000, immutable");
+  EXPECT_EQ(findHeader(get("/scene/assets/bus-mesh2024.gltf"), "Cache-Control"), "no-cache") << "a user's own name";
   EXPECT_EQ(findHeader(get("/scene/tileset.json"), "Cache-Control"), "no-cache");
   EXPECT_EQ(findHeader(get("/"), "Cache-Control"), "no-cache");
 }
