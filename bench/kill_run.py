@@ -12,6 +12,7 @@ Prints a line for each kill, and writes RECORD: the seconds of all attempts, and
 import json
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -68,6 +69,29 @@ def trained_steps(out):
         return 0
 
 
+def training_log(out):
+    return os.path.join(out, "logs", "train.log")
+
+
+def log_bytes(out):
+    try:
+        return os.path.getsize(training_log(out))
+    except OSError:
+        return 0
+
+
+def first_step(out, begin):
+    """The first step that the log of the training reports behind its first `begin` bytes; None if it reports none."""
+    try:
+        with open(training_log(out), "rb") as log:
+            log.seek(begin)
+            text = log.read().decode(errors="replace")
+    except OSError:
+        return None
+    step = re.search(r"training: (?:\d+ % \()?(\d+)(?:/\d+)? steps", text)
+    return int(step.group(1)) if step else None
+
+
 def version(out):
     try:
         status = os.stat(os.path.join(out, "run.json"))
@@ -119,6 +143,17 @@ def main():
     long = [name for name in names if unbroken[name] >= SHORT_SECONDS]
     more = random.choices(long, k=max(0, moments - len(names)))
     attempts, survivors, reached = [], 0, {name: 0 for name in names}
+    resumed, pending = [], None  # trainings after a kill; the checkpoint of one that has not gone on yet
+
+    def note_resumed():
+        """Notes where the training has gone on after the last kill of it, if that has left a checkpoint."""
+        nonlocal pending
+        if pending is None:
+            return
+        step = first_step(out, pending["log_bytes"])
+        if step is not None:
+            resumed.append({"checkpoint_step": pending["step"], "first_step": step})
+            pending = None
 
     # A stage may last less than a millisecond: what waits for it goes before everything else, if that is allowed.
     try:
@@ -147,9 +182,12 @@ def main():
                 programs, left = kill(process)
                 survivors += left
                 where = stage_in_progress(out) or "between stages"
+                note_resumed()
+                if where == "train" and trained_steps(out) > 0:
+                    pending = {"step": trained_steps(out), "log_bytes": log_bytes(out)}
                 seconds = time.time() - begin - 1
                 attempts.append({"target": name, "killed_in": where, "running": was_running, "again": missed,
-                                 "seconds": seconds, "steps": trained_steps(out) if where == "train" else 0})
+                                 "seconds": seconds})
                 print(f"killed in {where} after {seconds:.1f} s, {programs} children, {left} survived", flush=True)
                 if was_running and where in reached:
                     reached[where] += 1
@@ -159,6 +197,7 @@ def main():
     begin = time.time()
     process = start([])
     process.communicate()
+    note_resumed()
     attempts.append({"target": None, "seconds": time.time() - begin, "status": process.returncode})
     kills = [attempt for attempt in attempts if attempt.get("running") and not attempt["again"]]
     # What a kill destroys is at most what was done since the program had started, and on average what all attempts took
@@ -167,8 +206,8 @@ def main():
     json.dump({"attempts": attempts, "survivors": survivors, "kills": len(kills), "reached": reached,
                "status": attempts[-1]["status"], "seconds": seconds, "unbroken_seconds": whole,
                "repeated_seconds_at_most": max(attempt["seconds"] for attempt in kills),
-               "repeated_seconds_mean": (seconds - whole) / len(kills),
-               "steps_kept": max(attempt["steps"] for attempt in kills)}, open(record, "w"), indent=1)
+               "repeated_seconds_mean": (seconds - whole) / len(kills), "resumed": resumed},
+              open(record, "w"), indent=1)
 
 
 main()

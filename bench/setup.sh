@@ -86,8 +86,11 @@ judged() {
   fi
   jq -r '.psnr * 100 | round / 100' "$work/$name.json"
 }
-difference() { awk -v a="$1" -v b="$2" 'BEGIN { d = a - b; print d < 0 ? -d : d }'; }
-shortfall() { awk -v a="$1" -v b="$2" 'BEGIN { print a - b }'; }
+# What is not a number has no difference, so that no verdict on it holds.
+shortfall() {
+  if holds "$1" '<=' "$1" && holds "$2" '<=' "$2"; then awk -v a="$1" -v b="$2" 'BEGIN { print a - b }'; else echo unknown; fi
+}
+difference() { shortfall "$1" "$2" | sed 's/^-//'; }
 
 # photographs NAME DOWNSCALE BOUND: imports real photographs, trains for MINUTES with each of SEEDS, and evaluates held-out views.
 photographs() {
