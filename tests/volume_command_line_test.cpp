@@ -82,11 +82,15 @@ TEST_F(VolumeCommandLine, PredictsExposuresWhereExifExplainsThem) {
     const Said said = run({"eval", what, at("jittered"), "--exposure", "predicted"});
     EXPECT_EQ(said.exitCode, 0) << said.err;
     EXPECT_TRUE(contains(said.out + said.err, "exposure predicted from EXIF")) << said.out << said.err;
+    const Said chosen = run({"eval", what, at("jittered"), "--exposure", "auto"});
+    EXPECT_TRUE(contains(chosen.out, "exposure predicted from EXIF")) << chosen.out << chosen.err;
   }
   for (const std::string& what : {model(), scene()}) {
     const Said said = run({"eval", what, at("city"), "--exposure", "predicted"});
     EXPECT_EQ(said.exitCode, 1) << "all photos of this city have one exposure";
     EXPECT_TRUE(contains(said.err, "EXIF")) << said.err;
+    const Said chosen = run({"eval", what, at("city"), "--exposure", "auto"});
+    EXPECT_TRUE(contains(chosen.out, "exposure neutral")) << chosen.out << chosen.err;
   }
 }
 

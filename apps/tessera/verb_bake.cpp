@@ -8,6 +8,7 @@
 #include "apps/tessera/verbs.h"
 #include "bake/baker.h"
 #include "base/error.h"
+#include "base/log.h"
 #include "base/progress.h"
 #include "import/capture_reader.h"
 #include "representations/methods.h"
@@ -114,6 +115,8 @@ void addBakeVerb(CLI::App& app) {
   verb->add_option("scene", flags->scene, "scene folder to write")->required();
   verb->add_option("--capture", flags->capture,
                    "capture that the model was trained on; default: its path at training time");
+  verb->add_option("--name", flags->options.name,
+                   "name of the scene, for its title and for exports; default: that of the capture's folder");
   verb->add_option("--stride", flags->options.stride,
                    "use every n-th pixel of rows and columns to find what is visible")
       ->capture_default_str()
@@ -129,7 +132,8 @@ void addBakeVerb(CLI::App& app) {
   addDeviceFlags(*verb, flags->device);
   verb->callback([flags] {
     const ModelFolder folder(flags->model);
-    const std::string name = requireManifest(folder).method;
+    const ModelManifest manifest = requireManifest(folder);
+    const std::string& name = manifest.method;
     const Method* method = findMethod(name);
     if (method == nullptr || !isBaked(*method)) {
       throw Error(flags->model, "", "is a model of " + name + ", which is not baked",
@@ -137,6 +141,11 @@ void addBakeVerb(CLI::App& app) {
     }
     refuseFolderForScene(flags->scene);
     const BakeParameters parameters = flags->parameters.of(*method);
+    // Parts that are trained by themselves are checked by their baker.
+    if (!method->partsAlone && (manifest.plannedSteps == 0 || manifest.step < manifest.plannedSteps)) {
+      warn("{}: its training was interrupted after {} steps; go on with tessera train ... --resume, then bake again",
+           flags->model, manifest.step);
+    }
     const std::unique_ptr<Device> device = makeDevice(flags->device);
     const Capture capture =
         readCapture(flags->capture.empty() ? folder.readPlacement().capture.string() : flags->capture);

@@ -29,10 +29,12 @@ void addEvalVerb(CLI::App& app) {
   verb->add_option("--split", flags->split, "which photos")
       ->capture_default_str()
       ->check(CLI::IsMember({"test", "validation", "train"}));
-  verb->add_option("--exposure", flags->exposure,
-                   "neutral, predicted from EXIF, or fitted on the left half and evaluated on the right")
+  verb->add_option(
+          "--exposure", flags->exposure,
+          "neutral, predicted from EXIF, auto: predicted if the model can and else neutral, or fitted on the left "
+          "half and evaluated on the right")
       ->capture_default_str()
-      ->check(CLI::IsMember({"neutral", "predicted", "fitted"}));
+      ->check(CLI::IsMember({"neutral", "predicted", "auto", "fitted"}));
   verb->add_flag("--right-halves", flags->rightHalves,
                  "evaluate colour on the right half of each view, to compare with fitted exposures");
   verb->add_option("--json", flags->json, "write the result as one JSON object here; - prints it");
@@ -60,11 +62,14 @@ void addEvalVerb(CLI::App& app) {
         options.split != Split::train && !known.empty()) {
       warn("{} of the views were trained on ('{}' first): the numbers flatter the model", known.size(), known.front());
     }
-    options.exposures = *exposuresFromName(flags->exposure);
+    const bool choosesExposures = flags->exposure == "auto";
+    options.exposures = choosesExposures ? Exposures::predicted : *exposuresFromName(flags->exposure);
     options.rightHalves = flags->rightHalves;
     if (options.exposures == Exposures::predicted) {
       options.response = renderSource->exposureResponse();
-      if (!options.response) {
+      if (!options.response && choosesExposures) {
+        options.exposures = Exposures::neutral;
+      } else if (!options.response) {
         throw Error(flags->model, "--exposure predicted",
                     "does not tell how colours follow exposures: EXIF does not explain the gains of its photos",
                     "use neutral or fitted");

@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "scene/exposure_response.h"
 
 namespace tessera {
 
 struct BakeOptions {
+  std::string name;  // of the scene, for people; empty: that of the capture's folder
   // Baking keeps the samples along the rays of training photos whose weight in the image and whose opacity over a
   // renderer's step both exceed these thresholds (MERF). Bakers of models that were trained with a final opacity
   // threshold use that one.

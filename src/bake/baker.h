@@ -55,6 +55,7 @@ struct SceneDescription {
   std::array<float, 3> background = kHazySky;  // for directions that no photo shows, unless BakeOptions override it
   std::vector<SurfaceCoverage> coverage = {};  // of the surfaces of the finest level, if it was checked
   std::optional<ExposureResponse> exposureResponse = {};  // that of BakeOptions
+  std::string name = {};  // for people, that of BakeOptions; empty: that of the capture's folder
 };
 
 // The baker of an opened model of some method.

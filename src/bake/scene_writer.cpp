@@ -1,10 +1,15 @@
 #include "bake/scene_writer.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 
 #include "base/check.h"
+#include "base/error.h"
+#include "tiles/tileset_json.h"
 
 namespace tessera {
 
@@ -30,8 +35,14 @@ void addCount(std::vector<std::pair<std::string, uint64_t>>& counts, const std::
 
 SceneWriter::SceneWriter(const fs::path& folder, const Capture& capture, const SceneDescription& about)
     : folder_(folder) {
+  std::error_code status;
+  fs::create_directories(folder, status);
+  if (status || ::access(folder.c_str(), W_OK) != 0) {
+    throw Error(folder.string(), "", "cannot be written: " + (status ? status.message() : std::strerror(errno)),
+                "check its permissions, or name another folder");
+  }
   tileset_.representation = about.representation;
-  tileset_.name = fs::weakly_canonical(capture.root).filename().string();
+  tileset_.name = about.name.empty() ? fs::weakly_canonical(capture.root).filename().string() : about.name;
   tileset_.sourceFromWorld = capture.sourceFromWorld;
   tileset_.georeference = capture.geo;
   tileset_.near = about.near;
@@ -39,6 +50,11 @@ SceneWriter::SceneWriter(const fs::path& folder, const Capture& capture, const S
   tileset_.coverage = about.coverage;
   tileset_.exposureResponse = about.exposureResponse;
   placeOn(tileset_, about.grid);
+  requireWritable(tileset_);
+  if (const auto broken = frameError(tileset_)) {
+    throw Error((capture.root / "transforms.json").string(), "", "no scene can be made of this capture: " + *broken,
+                "import the photos again");
+  }
 }
 
 uint32_t SceneWriter::addResource(const std::string& name, const std::string& mimeType,

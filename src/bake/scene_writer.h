@@ -12,6 +12,8 @@ namespace tessera {
 
 class SceneWriter final : public ContentSink {
  public:
+  // Creates the folder. Throws Error if it cannot be written, or if no scene can have the capture's frames or the
+  // description's grid and `near`: before hours are spent on its contents.
   SceneWriter(const fs::path& folder, const Capture& capture, const SceneDescription& about);
 
   uint32_t addResource(const std::string& name, const std::string& mimeType, std::span<const std::byte> bytes) override;

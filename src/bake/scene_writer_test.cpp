@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "base/error.h"
 #include "base/testing/temporary_folder.h"
 
 namespace tessera {
@@ -51,6 +52,37 @@ class SceneWriting : public testing::Test {
 };
 
 constexpr CellRange kLeft = {{0, 0}, {1, 1}}, kRight = {{1, 0}, {2, 1}}, kBoth = {{0, 0}, {2, 1}};
+
+// Returns the error of the constructor, for people.
+std::string refusal(const fs::path& folder, const Capture& capture, const SceneDescription& about) {
+  try {
+    const SceneWriter writer(folder, capture, about);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST_F(SceneWriting, IsRefusedBeforeThereAreContents) {
+  capture_.sourceFromWorld(3, 3) = 0.5;
+  EXPECT_NE(refusal(folder_ / "scene", capture_, about_).find("town/transforms.json"), std::string::npos);
+  capture_.sourceFromWorld(3, 3) = 1;
+  about_.near = 1.5;
+  EXPECT_NE(refusal(folder_ / "scene", capture_, about_).find("--set near"), std::string::npos);
+  about_.near = 0.1;
+  EXPECT_EQ(refusal(folder_ / "scene", capture_, about_), "");
+  writeFileAtomically(folder_ / "file", "x");
+  EXPECT_NE(refusal(folder_ / "file/scene", capture_, about_).find("cannot be written"), std::string::npos);
+}
+
+TEST_F(SceneWriting, GivesTheSceneItsName) {
+  for (const char* name : {"", "harbour"}) {
+    about_.name = name;
+    SceneWriter writer(folder_ / "scene", capture_, about_);
+    writer.add(0, kBoth, makeBytes("both"), around(0, 4, 32));
+    EXPECT_EQ(writer.commit().tileset.name, *name == 0 ? "town" : name);
+  }
+}
 
 TEST_F(SceneWriting, MakesATreeOfLevelsAndABackgroundOfEach) {
   SceneWriter writer(folder_ / "scene", capture_, about_);

@@ -27,11 +27,10 @@ constexpr int kUnknownEnd = 1 << 8;  // of a program that something else has wai
 
 std::atomic<int64_t> peakOfChildren = 0;
 
-int64_t recordPeak(const rusage& usage) {
+void recordPeak(const rusage& usage) {
   const int64_t bytes = int64_t{usage.ru_maxrss} << 10;
   for (int64_t largest = peakOfChildren; bytes > largest && !peakOfChildren.compare_exchange_weak(largest, bytes);) {
   }
-  return bytes;
 }
 
 }  // namespace
@@ -91,7 +90,6 @@ std::string ChildProcess::start(std::vector<std::string> arguments, const ChildO
   failureIn.close();
   process_ = process;
   ended_ = false;
-  peakBytes_ = 0;
   int failure = 0;
   ssize_t count = 0;
   while ((count = ::read(failureOut.get(), &failure, sizeof failure)) < 0 && errno == EINTR) {
@@ -110,7 +108,7 @@ bool ChildProcess::waitFor(double seconds) {
     const pid_t ended = ::wait4(process_, &status_, WNOHANG, &usage);
     if (ended < 0 && errno != EINTR) status_ = kUnknownEnd;
     ended_ = ended == process_ || (ended < 0 && errno != EINTR);
-    if (ended_) peakBytes_ = recordPeak(usage);
+    if (ended_) recordPeak(usage);
     if (ended_ || steady_clock::now() >= end) break;
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
@@ -125,13 +123,22 @@ std::string ChildProcess::wait() {
     while ((ended = ::wait4(process_, &status_, 0, &usage)) < 0 && errno == EINTR) {
     }
     if (ended < 0) status_ = kUnknownEnd;
-    peakBytes_ = recordPeak(usage);
+    recordPeak(usage);
   }
   process_ = -1;
   ended_ = false;
-  if (WIFSIGNALED(status_)) return fmt::format("was ended by signal {}", WTERMSIG(status_));
-  if (!WIFEXITED(status_) || WEXITSTATUS(status_) == 0) return "";
-  return fmt::format("ended with status {}", WEXITSTATUS(status_));
+  if (signal() != 0) return fmt::format("was ended by signal {}", signal());
+  return status() == 0 ? "" : fmt::format("ended with status {}", status());
+}
+
+int ChildProcess::signal() const {
+  CHECK(!isRunning());
+  return WIFSIGNALED(status_) ? WTERMSIG(status_) : 0;
+}
+
+int ChildProcess::status() const {
+  CHECK(!isRunning());
+  return WIFEXITED(status_) ? WEXITSTATUS(status_) : 0;
 }
 
 int64_t takePeakOfChildren() {

@@ -57,21 +57,21 @@ class ChildProcess {
   void kill();
   // The end of what this run of it wrote to its standard output and error output.
   std::string lastWords(size_t bytes = 400) const;
-  // The largest resident size in bytes of the program, or of one that it ran itself; 0 before it has ended.
-  int64_t peakBytes() const { return peakBytes_; }
+  // How it ended, after `wait`: the signal that ended it, or 0, and the status that it returned, or 0.
+  int signal() const;
+  int status() const;
 
  private:
   pid_t process_ = -1;
   bool ended_ = false;
   int status_ = 0;
-  int64_t peakBytes_ = 0;
   bool hasOwnGroup_ = false;
   int64_t before_ = 0;   // bytes of the log that others wrote
   Descriptor messages_;  // a memory file, or the log
 };
 
-// Returns the largest ChildProcess::peakBytes of the children that ended since this was called before, killed ones,
-// too.
+// Returns the largest resident size in bytes of the child processes, and of programs that they ran themselves, that
+// ended since this was called before, killed ones, too.
 int64_t takePeakOfChildren();
 
 }  // namespace tessera

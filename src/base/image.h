@@ -33,4 +33,7 @@ ImageU8 toBytes(const ImageF& image);  // clamp to [0,1], round to nearest
 ImageU8 downscaleByArea(const ImageU8& image, int width, int height);
 ImageF downscaleByArea(const ImageF& image, int width, int height);
 
+// Returns a photo as viewers show it. `orientation`: of EXIF, 1 to 8; others mean 1.
+ImageU8 turnUpright(const ImageU8& image, int orientation);
+
 }  // namespace tessera

@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "base/random.h"
 
@@ -60,6 +64,30 @@ TEST(DownscaleByArea, ReturnsTheSamePictureForTheSameSize) {
 
 TEST(DownscaleByAreaDeathTest, RefusesToEnlarge) {
   EXPECT_DEATH(downscaleByArea(ImageU8(2, 2, 1), 3, 2), "width <= image.width");
+}
+
+// Rows of letters, one for each pixel.
+ImageU8 letters(const std::vector<std::string>& rows) {
+  ImageU8 image(static_cast<int>(rows[0].size()), static_cast<int>(rows.size()), 1);
+  for (size_t y = 0; y < rows.size(); ++y) std::copy(rows[y].begin(), rows[y].end(), image.at(0, static_cast<int>(y)));
+  return image;
+}
+
+std::vector<std::string> rows(const ImageU8& image) {
+  std::vector<std::string> rows;
+  for (int y = 0; y < image.height; ++y) rows.emplace_back(image.at(0, y), image.at(0, y) + image.width);
+  return rows;
+}
+
+TEST(TurnUpright, FollowsEachOrientationOfExif) {
+  // What a viewer must show, of which cameras store the following.
+  const std::vector<std::string> upright = {"abc", "def"};
+  const std::vector<std::pair<int, std::vector<std::string>>> stored = {
+      {1, {"abc", "def"}},     {2, {"cba", "fed"}},     {3, {"fed", "cba"}},     {4, {"def", "abc"}},
+      {5, {"ad", "be", "cf"}}, {6, {"cf", "be", "ad"}}, {7, {"fc", "eb", "da"}}, {8, {"da", "eb", "fc"}}};
+  for (const auto& [orientation, picture] : stored)
+    EXPECT_EQ(rows(turnUpright(letters(picture), orientation)), upright) << orientation;
+  for (const int unknown : {0, 9, -1}) EXPECT_EQ(rows(turnUpright(letters(upright), unknown)), upright) << unknown;
 }
 
 }  // namespace

@@ -162,7 +162,8 @@ class ViewEvaluator {
     if (measured) result.depth = depthError(view.depth, view.opacity, *measured, maskPointer);
     if (!options_.imagesDir.empty()) writePictures(photo.name, target, rendered);
     if (options_.onView) {
-      options_.onView(result, {target, rendered, view, maskPointer, measured ? &*measured : nullptr});
+      options_.onView(result,
+                      {target, rendered, view, maskPointer, measured ? &*measured : nullptr, photo.orientation});
     }
     return result;
   }

@@ -36,6 +36,7 @@ struct ViewPictures {
   const RenderedView& view;
   const ImageU8* mask;          // 1 channel, 0 = not evaluated; null if all pixels are
   const ImageF* measuredDepth;  // the photo's, of any size; null without one
+  int orientation = 1;          // of EXIF: how people look at them
 };
 
 // Photos of the same place differ in exposure. Neutral: the render is evaluated as it is. Predicted: times the gain

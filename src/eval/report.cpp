@@ -158,37 +158,39 @@ std::string coverageTable(const std::vector<SurfaceCoverage>& parts) {
 ReportBuilder::ReportBuilder(std::string title, size_t expectedViews)
     : title_(std::move(title)), longestSide_(longestSideFor(expectedViews)) {}
 
-ReportBuilder::Figure ReportBuilder::figure(std::string caption, const ImageU8& image) const {
+ReportBuilder::Figure ReportBuilder::figure(std::string caption, const ImageU8& image, int orientation) const {
   const double scale = std::min(1.0, static_cast<double>(longestSide_) / std::max(image.width, image.height));
-  const int width = std::max(1, static_cast<int>(std::lround(image.width * scale)));
-  const int height = std::max(1, static_cast<int>(std::lround(image.height * scale)));
-  return {std::move(caption), encodeJpeg(downscaleByArea(image, width, height), kJpegQuality), width, height};
+  const auto scaled = [scale](int side) { return std::max(1, static_cast<int>(std::lround(side * scale))); };
+  const ImageU8 upright = turnUpright(downscaleByArea(image, scaled(image.width), scaled(image.height)), orientation);
+  return {std::move(caption), encodeJpeg(upright, kJpegQuality), upright.width, upright.height};
 }
 
 void ReportBuilder::add(const ViewResult& result, const ViewPictures& pictures) {
   std::vector<Figure>& figures = figures_[result.name];
   figures.clear();
-  figures.push_back(figure("photo", toBytes(pictures.photo)));
-  figures.push_back(figure("rendering", toBytes(pictures.rendered)));
+  const auto add = [&](std::string caption, const ImageU8& image) {
+    figures.push_back(figure(std::move(caption), image, pictures.orientation));
+  };
+  add("photo", toBytes(pictures.photo));
+  add("rendering", toBytes(pictures.rendered));
   ImageF error = absoluteDifference(pictures.photo, pictures.rendered);
   if (pictures.mask) {
     for (size_t i = 0; i < error.pixels.size(); ++i) {
       if (pictures.mask->pixels[i] == 0) error.pixels[i] = std::nanf("");
     }
   }
-  figures.push_back(
-      figure(fmt::format("error, black 0 to white {}{}", kBrightestError, pictures.mask ? ", grey: not compared" : ""),
-             heatMap(error, 0, kBrightestError, ColourMap::inferno)));
+  add(fmt::format("error, black 0 to white {}{}", kBrightestError, pictures.mask ? ", grey: not compared" : ""),
+      heatMap(error, 0, kBrightestError, ColourMap::inferno));
   const ImageF depth = normalisedDepth(pictures.view);
   const auto [nearest, farthest] = depthRange(pictures.measuredDepth ? *pictures.measuredDepth : depth);
   const std::string range = fmt::format("{:.3g} (blue) to {:.3g} (yellow)", nearest, farthest);
-  figures.push_back(figure("depth, " + range, heatMap(depth, nearest, farthest, ColourMap::viridis)));
+  add("depth, " + range, heatMap(depth, nearest, farthest, ColourMap::viridis));
   if (pictures.measuredDepth) {
     ImageF measured = *pictures.measuredDepth;
     for (float& value : measured.pixels) {
       if (!(value > 0)) value = std::nanf("");
     }
-    figures.push_back(figure("depth, measured", heatMap(measured, nearest, farthest, ColourMap::viridis)));
+    add("depth, measured", heatMap(measured, nearest, farthest, ColourMap::viridis));
   }
 }
 

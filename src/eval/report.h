@@ -31,7 +31,7 @@ class ReportBuilder {
     int width = 0, height = 0;
   };
 
-  Figure figure(std::string caption, const ImageU8& image) const;
+  Figure figure(std::string caption, const ImageU8& image, int orientation) const;
 
   std::string title_;
   int longestSide_;

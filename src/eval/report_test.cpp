@@ -57,6 +57,18 @@ TEST(Report, ContainsEveryViewWithItsFourImages) {
   EXPECT_NE(judged.html.find(fmt::format("{:.2f} dB", judged.report.psnr)), std::string::npos);
 }
 
+TEST(Report, ShowsPhotosAsPeopleLookAtThem) {
+  FakeCapture fake("turned");
+  const ImageU8 photo = fakePhoto(64, 48, 0);
+  fake.add("portrait.png", photo).orientation = 6;
+  FakeRenderer renderer({toFloat(photo)});
+  ReportBuilder builder("turned", 1);
+  EvaluateOptions options;
+  options.onView = [&](const ViewResult& result, const ViewPictures& seen) { builder.add(result, seen); };
+  const EvaluationReport report = evaluate(renderer, fake.capture, options);
+  EXPECT_EQ(countOccurrences(builder.html(report), "<img width=\"48\" height=\"64\""), 4u);
+}
+
 TEST(Report, CountsHolesOfPartsWhereTheyWereChecked) {
   Judged judged = judge({"one.png"});
   EXPECT_EQ(judged.html.find("Coverage"), std::string::npos);

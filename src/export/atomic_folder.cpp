@@ -7,6 +7,7 @@
 
 #include <cerrno>
 #include <charconv>
+#include <string_view>
 
 #include "base/error.h"
 
@@ -17,7 +18,10 @@ Error couldNot(const fs::path& path, const std::error_code& status) {
   return Error(path.string(), "", "could not be written: " + status.message(), "check free space and permissions");
 }
 
-// Removes what killed processes left next to `place`.
+constexpr const char* kReplaced = "-old";  // ends the name of what is replaced, until that has been done
+
+}  // namespace
+
 void removeLeftovers(const fs::path& place) {
   const std::string prefix = place.filename().string() + ".partial-";
   std::error_code ignored;
@@ -28,12 +32,17 @@ void removeLeftovers(const fs::path& place) {
     int process = 0;
     const char* const end = name.data() + name.size();
     const auto [read, error] = std::from_chars(name.data() + prefix.size(), end, process);
-    if (error != std::errc() || read != end || process <= 0) continue;
-    if (::kill(process, 0) != 0 && errno == ESRCH) fs::remove_all(entry.path(), ignored);
+    const std::string_view rest(read, static_cast<size_t>(end - read));
+    if (error != std::errc() || process <= 0 || !(rest.empty() || rest == kReplaced || rest == kSpooled)) continue;
+    if (::kill(process, 0) == 0 || errno != ESRCH) continue;
+    // Of what was being replaced, nothing else may be left.
+    if (rest == kReplaced && !fs::exists(place, ignored)) {
+      fs::rename(entry.path(), place, ignored);
+    } else {
+      fs::remove_all(entry.path(), ignored);
+    }
   }
 }
-
-}  // namespace
 
 AtomicFolder::AtomicFolder(const fs::path& place, const std::function<bool(const std::string& name)>& isOurs)
     : place_(place.has_filename() ? place : place.parent_path()) {
@@ -71,8 +80,10 @@ void AtomicFolder::commit() {
       return;
     }
     // Some file systems do not support the exchange.
+    if (errno != EINVAL && errno != ENOSYS && errno != ENOTSUP)
+      throw couldNot(place_, std::error_code(errno, std::generic_category()));
     fs::path old = beside_;
-    old.replace_filename(place_.filename().string() + ".old");
+    old += kReplaced;
     fs::remove_all(old, status);
     fs::rename(place_, old, status);
     if (!status) fs::rename(beside_, place_, status);

@@ -68,6 +68,21 @@ TEST_F(AtomicFolderOnDisk, RemovesWhatKilledProcessesLeftBeside) {
   EXPECT_EQ(entries(), 3u) << "the new one, one that is still written, and one that nobody knows";
 }
 
+TEST_F(AtomicFolderOnDisk, PutsBackWhatAKilledProcessWasReplacing) {
+  const std::string nobody = ".partial-" + std::to_string(1 << 30);
+  write("new" + nobody + "-old/part1", "1");
+  write("new" + nobody + "-bytes", "1");
+  write("new.old/part1", "a user's own");
+  { AtomicFolder folder(root_ / "new", isOurs); }
+  EXPECT_EQ(readTextFile(root_ / "new/part1"), "1");
+  EXPECT_TRUE(fs::exists(root_ / "new.old/part1"));
+  EXPECT_EQ(entries(), 2u);
+  write("new" + nobody + "-old/part1", "2");
+  { AtomicFolder folder(root_ / "new", isOurs); }
+  EXPECT_EQ(readTextFile(root_ / "new/part1"), "1") << "nothing was lost";
+  EXPECT_EQ(entries(), 2u);
+}
+
 TEST_F(AtomicFolderOnDisk, RefusesAPlaceThatHoldsSomethingElse) {
   write("file", "x");
   write("mixed/part1", "1");

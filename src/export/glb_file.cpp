@@ -9,6 +9,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
+#include "export/atomic_folder.h"
 #include "tiles/glb.h"
 
 namespace tessera {
@@ -23,9 +24,10 @@ GlbFile::GlbFile(fs::path place) : place_(std::move(place)) {
   if (fs::is_directory(place_, status))
     throw Error(place_.string(), "", "is a folder, not a file", "name a file to write, or remove the folder");
   if (place_.has_parent_path()) fs::create_directories(place_.parent_path(), status);
+  removeLeftovers(place_);
   spool_ = beside_ = place_;
   beside_ += ".partial-" + std::to_string(::getpid());
-  spool_ += ".partial-" + std::to_string(::getpid()) + "-bytes";
+  spool_ += ".partial-" + std::to_string(::getpid()) + kSpooled;
   out_.open(spool_, std::ios::binary | std::ios::trunc);
   if (!out_) fail();
 }

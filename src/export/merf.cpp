@@ -88,12 +88,12 @@ class MerfFolder {
 
   void add(const std::string& name, const ImageU8& image) {
     const Bytes bytes = encodePng(image);
-    writeFileAtomically(root_ / (name + ".png"), bytes);
+    writeFileAtomically(root_ / (name + ".png"), bytes, true);
     bytes_ += bytes.size();
   }
   void add(const std::string& name, const nlohmann::ordered_json& json) {
     const std::string text = json.dump();
-    writeFileAtomically(root_ / name, text);
+    writeFileAtomically(root_ / name, text, true);
     bytes_ += text.size();
   }
   uint64_t bytes() const { return bytes_; }

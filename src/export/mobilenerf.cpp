@@ -227,7 +227,7 @@ MobilenerfExport exportMobilenerf(const fs::path& scene, const fs::path& out,
 
   ThreadPool pool(settings.threads);
   const auto write = [&](const std::string& file, const auto& bytes) {
-    writeFileAtomically(folder.path() / file, bytes);
+    writeFileAtomically(folder.path() / file, bytes, true);
     exported.bytesOnDisk += bytes.size();
   };
   for (const LevelContent& listed : level.contents()) {

@@ -106,11 +106,11 @@ class UnrealFolder {
 
  private:
   void write(const std::string& name, const std::string& text) {
-    writeFileAtomically(root_ / name, text);
+    writeFileAtomically(root_ / name, text, true);
     exported_.bytesOnDisk += text.size();
   }
   void write(const std::string& name, const Bytes& bytes) {
-    writeFileAtomically(root_ / name, bytes);
+    writeFileAtomically(root_ / name, bytes, true);
     exported_.bytesOnDisk += bytes.size();
   }
 

@@ -7,7 +7,7 @@ namespace tessera {
 const char* const kUnrealScript =
     R"py("""Imports the scene of tessera that lies beside this file into the open project of Unreal Engine 5 and places it in the
 open level. In the editor: Tools, Execute Python Script. The plugins "Python Editor Script Plugin" and "Editor Scripting
-Utilities" must be on. Assets go to /Game/Tessera/NAME; set TESSERA_FOLDER to change that. See docs/unreal.md of tessera."""
+Utilities" must be on. Assets go to /Game/Tessera/NAME, or NAME_level_N of a coarser level; set TESSERA_FOLDER to change that. See docs/unreal.md of tessera."""
 import json
 import os
 import re
@@ -173,6 +173,8 @@ def main():
     if scene.get("format") != "tessera-unreal" or scene.get("version") != 1:
         raise RuntimeError("scene.json is of another version than this script")
     name = re.sub(r"\W", "_", scene["name"]) or "scene"
+    if scene["level"] > 0:
+        name += "_level_%d" % scene["level"]
     root = os.environ.get("TESSERA_FOLDER", "/Game/Tessera/" + name)
     assets.delete_directory(root)
     materials = {}

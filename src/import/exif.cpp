@@ -3,6 +3,7 @@
 #include <libexif/exif-data.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -45,8 +46,14 @@ std::optional<double> rationalOrZero(const ExifData& data, const ExifEntry& entr
   return value.numerator == 0 ? std::optional(0.0) : rational(data, entry, index);
 }
 
+// Degrees.
+struct Angle {
+  double value = 0;
+  double step = 0;  // between the angles that can be stated in this way
+};
+
 // Reads an angle of degrees, minutes and seconds, negative if the reference letter is `negative`.
-std::optional<double> angle(const ExifData& data, int tag, int referenceTag, char negative) {
+std::optional<Angle> readAngle(const ExifData& data, int tag, int referenceTag, char negative) {
   const ExifEntry* entry = gpsEntry(data, tag, EXIF_FORMAT_RATIONAL, 3);
   const ExifEntry* reference = gpsEntry(data, referenceTag, EXIF_FORMAT_ASCII, 1);
   if (entry == nullptr || reference == nullptr) return std::nullopt;
@@ -54,14 +61,27 @@ std::optional<double> angle(const ExifData& data, int tag, int referenceTag, cha
              seconds = rationalOrZero(data, *entry, 2);
   if (!degrees || !minutes || !seconds) return std::nullopt;
   const double value = *degrees + *minutes / 60 + *seconds / 3600;
-  return static_cast<char>(reference->data[0]) == negative ? -value : value;
+  constexpr std::array kUnits = {1.0, 1.0 / 60, 1.0 / 3600};
+  double step = 1;
+  for (size_t i = 0; i < kUnits.size(); ++i) {
+    const ExifRational number =
+        exif_get_rational(entry->data + 8 * i, exif_data_get_byte_order(const_cast<ExifData*>(&data)));
+    const bool isUsed = number.numerator > 0 || number.denominator > 1;
+    if (isUsed) step = std::min(step, kUnits[i] / number.denominator);
+  }
+  return Angle{static_cast<char>(reference->data[0]) == negative ? -value : value, step};
 }
 
-std::optional<GpsFix> readGpsFix(const ExifData& data) {
-  const auto latitude = angle(data, EXIF_TAG_GPS_LATITUDE, EXIF_TAG_GPS_LATITUDE_REF, 'S');
-  const auto longitude = angle(data, EXIF_TAG_GPS_LONGITUDE, EXIF_TAG_GPS_LONGITUDE_REF, 'W');
+struct ExifFix {
+  GpsFix fix;
+  double latitudeStep = 0, longitudeStep = 0;  // degrees
+};
+
+std::optional<ExifFix> readGpsFix(const ExifData& data) {
+  const auto latitude = readAngle(data, EXIF_TAG_GPS_LATITUDE, EXIF_TAG_GPS_LATITUDE_REF, 'S');
+  const auto longitude = readAngle(data, EXIF_TAG_GPS_LONGITUDE, EXIF_TAG_GPS_LONGITUDE_REF, 'W');
   if (!latitude || !longitude) return std::nullopt;
-  GpsFix fix{.latitude = *latitude, .longitude = *longitude, .hasAltitude = false};
+  GpsFix fix{.latitude = latitude->value, .longitude = longitude->value, .hasAltitude = false};
   if (const ExifEntry* altitude = gpsEntry(data, EXIF_TAG_GPS_ALTITUDE, EXIF_FORMAT_RATIONAL, 1)) {
     const ExifEntry* reference = gpsEntry(data, EXIF_TAG_GPS_ALTITUDE_REF, EXIF_FORMAT_BYTE, 1);
     const auto metres = rational(data, *altitude, 0);
@@ -69,7 +89,7 @@ std::optional<GpsFix> readGpsFix(const ExifData& data) {
     fix.hasAltitude = metres.has_value();
     if (reference != nullptr && reference->data[0] == 1) fix.altitude = -fix.altitude;
   }
-  return fix;
+  return ExifFix{fix, latitude->step, longitude->step};
 }
 
 // Returns a positive number, or 0.
@@ -139,12 +159,14 @@ std::optional<double> readTime(const ExifData& data) {
 
 // Whether EXIF, which has fewer digits, states the place of the XMP. A place that another program has corrected stands
 // in EXIF alone.
-bool isSamePlace(const GpsFix& exif, double latitude, double longitude) {
-  constexpr double kMetresPerDegree = 111320, kRounding = 0.5;  // metres
+bool isSamePlace(const ExifFix& fix, double latitude, double longitude) {
+  constexpr double kMetresPerDegree = 111320, kLeast = 0.5;  // metres
+  const GpsFix& exif = fix.fix;
   const double north = kMetresPerDegree * (latitude - exif.latitude);
   const double east =
       kMetresPerDegree * std::remainder(longitude - exif.longitude, 360) * std::cos(latitude * std::numbers::pi / 180);
-  return std::hypot(north, east) <= kRounding;
+  return std::abs(north) <= std::max(kLeast, kMetresPerDegree * fix.latitudeStep) &&
+         std::abs(east) <= std::max(kLeast, kMetresPerDegree * fix.longitudeStep);
 }
 
 bool makesSense(const GpsFix& fix) {
@@ -168,8 +190,10 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
   jpeg = jpeg.first(std::min(jpeg.size(), kMax));
   const std::unique_ptr<ExifData, DeleteExif> data(
       exif_data_new_from_data(bytes, static_cast<unsigned int>(jpeg.size())));
+  std::optional<ExifFix> exif;
   if (data != nullptr) {
-    tags.gps = readGpsFix(*data);
+    exif = readGpsFix(*data);
+    if (exif) tags.gps = exif->fix;
     tags.camera = readCamera(*data);
     tags.exposure = {positive(*data, EXIF_IFD_EXIF, EXIF_TAG_EXPOSURE_TIME),
                      positive(*data, EXIF_IFD_EXIF, EXIF_TAG_ISO_SPEED_RATINGS),
@@ -186,7 +210,7 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
     const XmpTags xmp = decodeXmp(text.substr(begin, end - begin));
     // Receivers with corrections write more digits there than in EXIF.
     const bool isCorrected = tags.gps && makesSense(*tags.gps) && xmp.latitude && xmp.longitude &&
-                             !isSamePlace(*tags.gps, *xmp.latitude, *xmp.longitude);
+                             !isSamePlace(*exif, *xmp.latitude, *xmp.longitude);
     if (xmp.latitude && xmp.longitude && !isCorrected) {
       GpsFix fix = tags.gps.value_or(GpsFix{.hasAltitude = false});
       fix.latitude = *xmp.latitude;

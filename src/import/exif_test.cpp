@@ -225,6 +225,22 @@ TEST(Exif, PrefersThePositionOfXmpUnlessItMakesNoSense) {
   }
 }
 
+TEST(Exif, PrefersThePositionOfXmpToWholeSeconds) {
+  // 31 metres a second of arc.
+  ExifBuilder coarse;
+  coarse.entry(1, 2, 2, {'N', 0})
+      .rationals(2, {50, 1, 30, 1, 36, 1})
+      .entry(3, 2, 2, {'E', 0})
+      .rationals(4, {8, 1, 15, 1, 0, 1});
+  Bytes jpeg = encodeJpeg(gradientPicture(8, 8), 90, coarse.exif());
+  const std::string packet = "<x:xmpmeta a:GpsLatitude=\"50.5102\" a:GpsLongitude=\"8.2501\"></x:xmpmeta>";
+  const auto* begin = reinterpret_cast<const std::byte*>(packet.data());
+  jpeg.insert(jpeg.end(), begin, begin + packet.size());
+  const auto fix = decodePhotoTags(jpeg).gps;
+  ASSERT_TRUE(fix.has_value());
+  EXPECT_EQ(fix->latitude, 50.5102);
+}
+
 TEST(Exif, CountsExposureInStops) {
   EXPECT_EQ(exposureStops({0.01, 200, 2}), std::log2(0.01 * 200 / 4));
   EXPECT_EQ(exposureStops({0.01, 200, 0}), std::log2(0.01 * 200)) << "a lens without an aperture";

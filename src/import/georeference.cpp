@@ -235,15 +235,16 @@ std::optional<Georeference::Bend> findBend(const Points& places, const Points& r
   const Vec3d middle = places.rowwise().mean();
   const Points centred = places.colwise() - middle;
   const double farthest = centred.topRows<2>().colwise().norm().maxCoeff();
-  Eigen::MatrixXd basis(n, kUnknowns);
+  Eigen::Matrix<double, Eigen::Dynamic, kUnknowns> basis(n, kUnknowns);
   for (Eigen::Index i = 0; i < n; ++i) {
     const Vec2d at = centred.col(i).head<2>() / farthest;
     basis.row(i) << 1, at.x(), at.y(), at.squaredNorm();
   }
-  const auto solver = (basis.transpose() * basis).completeOrthogonalDecomposition();
+  const Mat4d normal = basis.transpose() * basis;
+  const auto solver = normal.completeOrthogonalDecomposition();
   if (solver.rank() < kUnknowns) return std::nullopt;
   const Eigen::VectorXd heights = residuals.row(2).transpose();
-  const Eigen::VectorXd solution = solver.solve(basis.transpose() * heights);
+  const Eigen::Vector4d solution = solver.solve(basis.transpose() * heights);
   const double variance = (heights - basis * solution).squaredNorm() / static_cast<double>(n - kUnknowns);
   return Georeference::Bend{solution[3], std::sqrt(variance * solver.pseudoInverse()(3, 3))};
 }

@@ -334,7 +334,11 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
   }
 
   std::vector<UprightTags> tags;
-  for (const PhotoFacts& fact : facts) tags.push_back({fact.tags.gimbal, fact.tags.orientation});
+  for (size_t i = 0; i < facts.size(); ++i) {
+    int& orientation = capture.photos[i].orientation;
+    if (orientation == 1) orientation = facts[i].tags.orientation;
+    tags.push_back({facts[i].tags.gimbal, orientation});
+  }
   const Orientation orientation = orientWorld(source, tags);
   inform("{} photos, {} points; {}", capture.photos.size(), capture.points.size(), orientation.how);
 

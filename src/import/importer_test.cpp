@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "import/capture_reader.h"
 #include "import/testing/test_support.h"
+#include "scene/capture_writer.h"
 
 namespace tessera {
 namespace {
@@ -434,12 +435,15 @@ TEST_F(Import, NeverOverwritesItsSource) {
 TEST_F(Import, ImportsItsOwnCapturesUnchanged) {
   for (int i = 0; i < 9; ++i) add("images/" + std::to_string(i) + ".png");
   write();
-  const Capture first = run();
+  Capture first = run();
+  first.photos[3].orientation = 8;
+  writeCapture(first);
   const Capture second = importCapture(out_, folder_ / "again");
   ASSERT_EQ(second.photos.size(), first.photos.size());
   for (size_t i = 0; i < 9; ++i) {
     EXPECT_EQ(second.photos[i].name, first.photos[i].name);
     EXPECT_EQ(second.photos[i].split, first.photos[i].split);
+    EXPECT_EQ(second.photos[i].orientation, i == 3 ? 8 : 1);
     EXPECT_EQ(second.photos[i].worldFromCamera.translation, first.photos[i].worldFromCamera.translation);
   }
   EXPECT_EQ(second.sourceFromWorld, first.sourceFromWorld);

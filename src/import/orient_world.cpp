@@ -36,13 +36,16 @@ Vec3d upInCamera(const GimbalAngles& gimbal) {
   return Eigen::AngleAxisd(-roll, Vec3d::UnitZ()) * level;
 }
 
+// The direction in which the photos differ least.
 Vec3d planeNormal(const std::vector<Photo>& photos) {
-  Eigen::Matrix3Xd centres(3, static_cast<Eigen::Index>(photos.size()));
-  for (size_t i = 0; i < photos.size(); ++i) {
-    centres.col(static_cast<Eigen::Index>(i)) = photos[i].worldFromCamera.translation;
+  Vec3d middle = Vec3d::Zero();
+  for (const Photo& photo : photos) middle += photo.worldFromCamera.translation / static_cast<double>(photos.size());
+  Mat3d covariance = Mat3d::Zero();
+  for (const Photo& photo : photos) {
+    const Vec3d offset = photo.worldFromCamera.translation - middle;
+    covariance += offset * offset.transpose();
   }
-  centres.colwise() -= Vec3d(centres.rowwise().mean());
-  return Eigen::JacobiSVD<Eigen::MatrixXd>(centres, Eigen::ComputeFullU).matrixU().col(2);
+  return Eigen::SelfAdjointEigenSolver<Mat3d>(covariance).eigenvectors().col(0);
 }
 
 struct Up {
@@ -131,7 +134,7 @@ double applySimilarity(Capture& capture, const Mat4d& newFromOld) {
     photo.depthUnit *= static_cast<float>(scale);
   }
   for (SparsePoint& point : capture.points) point.xInWorld = move(point.xInWorld);
-  const Mat4d oldFromNew = newFromOld.inverse();
+  const Mat4d oldFromNew = affineInverse(newFromOld);
   capture.sourceFromWorld *= oldFromNew;
   if (capture.geo) capture.geo->enuFromWorld *= oldFromNew;
   return scale;

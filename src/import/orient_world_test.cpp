@@ -29,6 +29,23 @@ TEST(Orient, FindsEastNorthUpInMetresFromGps) {
   EXPECT_NEAR((enu - enuFromGps(geo, photo.gps->latitude, photo.gps->longitude, photo.gps->altitude)).norm(), 0, 1e-3);
 }
 
+// The product of a number and its reciprocal is often not 1: a general inverse had another last row for one scale in
+// seven.
+TEST(Orient, KeepsItsMapsAffineAtAnyScale) {
+  for (int i = 1; i < 200; ++i) {
+    SourceCapture source = flight();
+    Mat4d other = Mat4d::Identity();
+    const Mat3d turn = Eigen::AngleAxisd(0.1 * i, Vec3d(1, 2, 3).normalized()).toRotationMatrix();
+    other.topLeftCorner<3, 3>() = 0.037 * i * turn;
+    applySimilarity(source.capture, other);
+    orientWorld(source, {});
+    const Eigen::RowVector4d last(0, 0, 0, 1);
+    EXPECT_EQ(source.capture.sourceFromWorld.row(3), last) << i;
+    ASSERT_TRUE(source.capture.geo.has_value());
+    EXPECT_EQ(source.capture.geo->enuFromWorld.row(3), last) << i;
+  }
+}
+
 TEST(Orient, RecentresAtTheMedianCamera) {
   for (const bool hasGps : {true, false}) {
     SourceCapture source = flight();

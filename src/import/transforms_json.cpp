@@ -116,6 +116,14 @@ std::optional<Mat4d> readMatrix(const Json& object, const char* key) {
   return matrix;
 }
 
+// The same of a finite affine map. Its last row is made exact: earlier versions wrote it with a rounding error.
+std::optional<Mat4d> readAffineMap(const Json& object, const char* key) {
+  auto matrix = readMatrix(object, key);
+  if (!matrix || !matrix->allFinite()) return std::nullopt;
+  matrix->row(3) << 0, 0, 0, 1;
+  return matrix;
+}
+
 // Returns whether the value is null, false, 0, or a list of these.
 bool saysNothing(const Json& value) {
   const auto isNothing = [](const Json& v) {
@@ -230,11 +238,9 @@ bool readOurs(const Json& ours, TransformsFile& file, std::string& reason) {
       file.cameras.push_back(*decoded);
     }
   }
-  if (const auto matrix = readMatrix(ours, "source_from_world"); matrix && matrix->allFinite()) {
-    file.sourceFromWorld = *matrix;
-  }
+  if (const auto matrix = readAffineMap(ours, "source_from_world")) file.sourceFromWorld = *matrix;
   const Json& geo = objectAt(ours, "geo");
-  if (const auto matrix = readMatrix(geo, "enu_from_world"); matrix && matrix->allFinite()) {
+  if (const auto matrix = readAffineMap(geo, "enu_from_world")) {
     file.geo =
         GeoFrame{numberOr(geo, "latitude", 0), numberOr(geo, "longitude", 0), numberOr(geo, "altitude", 0), *matrix};
   }
@@ -264,6 +270,8 @@ bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& fil
     if (camera >= 0 && camera < static_cast<double>(file.cameras.size())) frame.camera = static_cast<int>(camera);
     frame.name = textOr(ours, "name");
     frame.exposure = numberOr(ours, "exposure", 0);
+    const double orientation = numberOr(ours, "orientation", 1);
+    if (orientation >= 1 && orientation <= 8) frame.orientation = static_cast<int>(orientation);
     const double unit = numberOr(ours, "depth_unit", 0);
     frame.depthUnit = unit > 0 && unit < 1e30 ? static_cast<float>(unit) : 0.0f;
     const Json& gps = objectAt(ours, "gps");

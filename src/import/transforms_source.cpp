@@ -237,6 +237,7 @@ bool addFrame(const fs::path& root, const TransformsFile& transforms, const Tran
   photo.name =
       !frame.name.empty() ? frame.name : photo.image.lexically_relative(fs::weakly_canonical(root)).generic_string();
   photo.exposure = frame.exposure;
+  photo.orientation = frame.orientation;
   photo.gps = frame.gps;
   capture.photos.push_back(std::move(photo));
   source.maskIsInverted.push_back(inverted);
@@ -278,7 +279,7 @@ SourceCapture readTransforms(const std::vector<fs::path>& files) {
     } else {
       Mat4d worldFromSource = transforms.appliedTransform;
       worldFromSource.topRows<3>() *= transforms.appliedScale;
-      capture.sourceFromWorld = worldFromSource.inverse();
+      capture.sourceFromWorld = affineInverse(worldFromSource);
     }
     readPoints(file, transforms, capture);
     std::vector<std::optional<Split>> splits;

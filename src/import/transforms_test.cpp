@@ -329,12 +329,24 @@ Capture fullCapture(const fs::path& root) {
   writeDepthExr(rich.depth, ImageF(8, 6, 1, 2.5f));
   rich.depthUnit = 0.3f;
   rich.exposure = -0.7;
+  rich.orientation = 6;
   rich.gps = GpsFix{50.123456789012345, -0.1, 12.5, 40.1};
   capture.points = {{Vec3d(1.0 / 3, 2, 3), {9, 8, 7}, 0.4f}, {Vec3d(-1, 0, 1e-12), {}, 0}};
   capture.observations = {{0, 1, 1.5f, 2.25f, 0.1f}, {2, 0, 3, 4, 0.2f}};
-  capture.geo = GeoFrame{1.0 / 3, -75, 12, Mat4d::Identity() * 1.25};
+  capture.geo = GeoFrame{1.0 / 3, -75, 12, Mat4d::Identity()};
+  capture.geo->enuFromWorld.topLeftCorner<3, 3>() *= 1.25;
   capture.sourceFromWorld(0, 3) = 1e6 + 1.0 / 3;
   return capture;
+}
+
+TEST(Captures, OfEarlierVersionsGetAffineMaps) {
+  const TemporaryFolder folder;
+  Capture capture = fullCapture(folder.path());
+  capture.sourceFromWorld(3, 3) = capture.geo->enuFromWorld(3, 3) = std::nextafter(1.0, 0.0);
+  writeCapture(capture);
+  const Capture read = readCapture(folder.path());
+  EXPECT_EQ(read.sourceFromWorld(3, 3), 1);
+  EXPECT_EQ(read.geo->enuFromWorld(3, 3), 1);
 }
 
 TEST(Captures, AreReadBackExactlyAsWritten) {
@@ -355,6 +367,7 @@ TEST(Captures, AreReadBackExactlyAsWritten) {
     EXPECT_EQ(a.worldFromCamera.translation, b.worldFromCamera.translation);
     EXPECT_EQ(a.split, b.split);
     EXPECT_EQ(a.exposure, b.exposure);
+    EXPECT_EQ(a.orientation, b.orientation);
     ASSERT_EQ(a.gps.has_value(), b.gps.has_value());
   }
   EXPECT_EQ(read.photos[1].depthUnit, 0.3f);

@@ -15,11 +15,10 @@ namespace {
 constexpr double kSecondsBetweenLooks = 0.5;
 constexpr size_t kLastWords = 1 << 14;  // a trace of its stack may follow the reason
 
-// Whether a program was ended from outside, by how it ended.
-bool isKill(const std::string& end) {
+// Whether a program was ended from outside.
+bool isKilled(const ChildProcess& process) {
   constexpr std::array kSignals = {SIGKILL, SIGTERM, SIGINT, SIGHUP};
-  return std::any_of(kSignals.begin(), kSignals.end(),
-                     [&](int signal) { return end == fmt::format("was ended by signal {}", signal); });
+  return std::find(kSignals.begin(), kSignals.end(), process.signal()) != kSignals.end();
 }
 
 }  // namespace
@@ -30,7 +29,7 @@ ColmapProgram::ColmapProgram(fs::path log, std::string program) : log_(std::move
   const std::string remedy = fmt::format("install COLMAP {}: apt-get install colmap", kColmapVersion);
   if (!failure.empty()) throw Error(program_, "", "cannot be run: " + failure, remedy);
   const std::string helped = process.wait();
-  if (isKill(helped)) throw ColmapKilled(program_ + " help", "", helped, "run again to go on");
+  if (isKilled(process)) throw ColmapKilled(program_ + " help", "", helped, "run again to go on");
   const std::string help = process.lastWords(1 << 16);
   const size_t at = help.find("COLMAP ");
   if (at == help.npos) throw Error(program_, "", "does not say that it is COLMAP", remedy);
@@ -54,14 +53,13 @@ void ColmapProgram::run(std::vector<std::string> arguments, const std::function<
     if (watch) watch();
   }
   const std::string end = process.wait();
-  peakBytes_ = std::max(peakBytes_, process.peakBytes());
   // What it wrote may then be incomplete, whatever it reports.
   if (isNearlyFull(fs::absolute(log_).parent_path())) {
     throw ColmapKilled(program_ + " " + command, "", "has left hardly any space on the disk of " + log_.string(),
                        "free some, and run again to go on");
   }
   if (end.empty()) return;
-  if (isKill(end) || process.lastWords(kLastWords).find("bad_alloc") != std::string::npos) {
+  if (isKilled(process) || process.lastWords(kLastWords).find("bad_alloc") != std::string::npos) {
     throw ColmapKilled(program_ + " " + command, "", end,
                        "if memory ran out, close other programs or use fewer threads; run again to go on");
   }

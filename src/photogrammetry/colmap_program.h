@@ -37,12 +37,9 @@ class ColmapProgram {
   // it fails. That it reports success means little: callers look at what it wrote.
   void run(std::vector<std::string> arguments, const std::function<void()>& watch = {});
 
-  int64_t peakBytes() const { return peakBytes_; }  // of all runs
-
  private:
   fs::path log_;
   std::string program_;
-  int64_t peakBytes_ = 0;
 };
 
 }  // namespace tessera

@@ -58,7 +58,6 @@ PhotoMatches::PhotoMatches(fs::path folder, const PhotoList& list, ColmapSetting
 void PhotoMatches::runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look) {
   ColmapProgram colmap(folder_ / fmt::format("{}.log", step), settings_.program);
   colmap.run(std::move(arguments), look);
-  peakBytes_ = std::max(peakBytes_, colmap.peakBytes());
 }
 
 void PhotoMatches::discard() const {
@@ -149,10 +148,14 @@ LookAlikes PhotoMatches::findLookAlikes(const Watch& watch) {
 
 void PhotoMatches::match(const std::vector<PhotoPair>& pairs, const Watch& watch) {
   const fs::path list = folder_ / "pairs.txt";
-  std::vector<PhotoPair> missing;
-  const auto known = ColmapDatabase(database()).inliers();
-  std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(missing),
-               [&](const PhotoPair& pair) { return !known.contains(pair); });
+  const auto notCompared = [&] {
+    std::vector<PhotoPair> missing;
+    const auto known = ColmapDatabase(database()).inliers();
+    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(missing),
+                 [&](const PhotoPair& pair) { return !known.contains(pair); });
+    return missing;
+  };
+  const std::vector<PhotoPair> missing = notCompared();
   for (size_t begin = 0; begin < missing.size(); begin += kPairsAtOnce) {
     std::string text;
     const size_t end = std::min(missing.size(), begin + kPairsAtOnce);
@@ -167,6 +170,17 @@ void PhotoMatches::match(const std::vector<PhotoPair>& pairs, const Watch& watch
          "pairs", "--SiftMatching.use_gpu", "0", "--SiftMatching.num_threads", settings_.threadsText()},
         [&] { watch(static_cast<int64_t>(pairs.size() - missing.size() + begin)); });
     watch(static_cast<int64_t>(pairs.size() - missing.size() + end));
+  }
+  // Whatever the program reported.
+  const std::map<int, int> features = ColmapDatabase(database()).features();
+  const std::vector<PhotoPair> left = notCompared();
+  const auto without = std::count_if(left.begin(), left.end(), [&](const PhotoPair& pair) {
+    return features.contains(pair.first) && features.contains(pair.second);
+  });
+  if (without > 0) {
+    throw Error(database().string(), "",
+                fmt::format("lacks {} of {} pairs after they were compared", without, pairs.size()),
+                "see " + (folder_ / "matches.log").string() + "; run again to compare them");
   }
 }
 

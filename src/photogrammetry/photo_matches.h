@@ -4,7 +4,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <utility>
 #include <vector>
 
 #include "photogrammetry/colmap_program.h"
@@ -48,8 +47,6 @@ class PhotoMatches {
   // which those in `apart` are in another model.
   std::vector<LeftOutPhoto> explain(const std::vector<int>& photos, const std::vector<int>& apart) const;
 
-  int64_t takePeakBytes() { return std::exchange(peakBytes_, 0); }  // of the programs run since the last call
-
  private:
   fs::path database() const { return folder_ / "database.db"; }
   void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
@@ -57,7 +54,6 @@ class PhotoMatches {
   fs::path folder_;
   const PhotoList& list_;
   ColmapSettings settings_;
-  int64_t peakBytes_ = 0;
 };
 
 }  // namespace tessera

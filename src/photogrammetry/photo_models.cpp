@@ -74,7 +74,6 @@ PhotoModels::PhotoModels(fs::path folder, const PhotoList& list, ColmapSettings 
 void PhotoModels::runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look) {
   ColmapProgram colmap(folder_ / fmt::format("{}.log", step), settings_.program);
   colmap.run(std::move(arguments), look);
-  peakBytes_ = std::max(peakBytes_, colmap.peakBytes());
 }
 
 void PhotoModels::discardMapped() const {
@@ -113,8 +112,10 @@ bool PhotoModels::agreesWithGps(const fs::path& joined, const fs::path& before) 
   const auto was = fit(before);
   if (!was) return true;  // nothing can be said
   const auto is = fit(joined);
-  return is && is->rmsMetres<kWorse * was->rmsMetres + kMetres&& static_cast<double>(is->inliers) / is->fixes> kFewer *
-                   static_cast<double>(was->inliers) / was->fixes;
+  if (!is) return false;
+  const auto share = [](const Georeference& fit) { return static_cast<double>(fit.inliers) / fit.fixes; };
+  const double maxMetres = kWorse * was->rmsMetres + kMetres;
+  return is->rmsMetres < maxMetres && share(*is) > kFewer * share(*was);
 }
 
 int PhotoModels::join(const Watch& watch) {
@@ -126,7 +127,7 @@ int PhotoModels::join(const Watch& watch) {
   Piece whole = pieces[0];
   std::vector<Piece> left(pieces.begin() + 1, pieces.end());
   int count = 0;
-  // What one model shares no photos with, it may once it has been joined with another.
+  // A model that cannot be joined with the first may be once others have been.
   for (bool joinsMore = true; joinsMore;) {
     joinsMore = false;
     for (auto piece = left.begin(); piece != left.end();) {
@@ -142,10 +143,13 @@ int PhotoModels::join(const Watch& watch) {
                 {"model_merger", "--input_path1", whole.folder.string(), "--input_path2", piece->folder.string(),
                  "--output_path", attempt.string()},
                 [&] { watch(0); });
-      piece = left.erase(piece);
       // If it fails, it reports success and writes the first model.
       const std::set<int> photos = photosIn(attempt);
-      if (photos.size() <= whole.photos.size() || !agreesWithGps(attempt, whole.folder)) continue;
+      if (photos.size() <= whole.photos.size() || !agreesWithGps(attempt, whole.folder)) {
+        ++piece;
+        continue;
+      }
+      piece = left.erase(piece);
       replaceFolder(attempt, result);
       whole = {result, photos};
       joinsMore = true;

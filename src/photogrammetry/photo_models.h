@@ -10,7 +10,6 @@
 #include <functional>
 #include <optional>
 #include <set>
-#include <utility>
 #include <vector>
 
 #include "import/source.h"
@@ -59,8 +58,6 @@ class PhotoModels {
   // Returns the last model, with photos under their own names.
   SourceCapture read() const;
 
-  int64_t takePeakBytes() { return std::exchange(peakBytes_, 0); }  // of the programs run since the last call
-
  private:
   static constexpr size_t kLeastShared = 3;  // photos of models that model_merger joins
 
@@ -93,7 +90,6 @@ class PhotoModels {
   fs::path folder_;
   const PhotoList& list_;
   ColmapSettings settings_;
-  int64_t peakBytes_ = 0;
 };
 
 }  // namespace tessera

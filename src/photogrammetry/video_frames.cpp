@@ -105,9 +105,8 @@ struct VideoFrames::Decoding {
   }
 
   // Waits for the end of the program. Returns what it complained of last, or nothing.
-  std::string finish(int64_t& peakBytes) {
+  std::string finish() {
     const std::string end = process.wait();
-    peakBytes = std::max(peakBytes, process.peakBytes());
     if (!end.empty()) {
       throw Error(video.string(), "", fmt::format("{} {}: {}", program, end, lastLine(process)),
                   "check that the video plays, and the free space; run again to go on");
@@ -204,7 +203,7 @@ void VideoFrames::choose(const Watch& watch) {
   ImageU8 picture;
   const auto look = [&] { watch(static_cast<int64_t>(sharpness.size())); };
   while (decoding.next(picture, look)) sharpness.push_back(imageSharpness(picture));
-  const std::string complaint = decoding.finish(peakBytes_);
+  const std::string complaint = decoding.finish();
   if (sharpness.size() < kFewestFramesOfVideo) {
     throw Error(video_.string(), "",
                 fmt::format("has {} frames that can be decoded; poses need three", sharpness.size()),
@@ -252,7 +251,7 @@ void VideoFrames::extract(const Watch& watch) {
     ImageU8 picture;
     for (; done < end && decoding.next(picture, look); ++done)
       writeJpeg(frameFile(missing[done]), picture, kJpegQuality);
-    const std::string complaint = decoding.finish(peakBytes_);
+    const std::string complaint = decoding.finish();
     if (done == end) continue;
     throw Error(video_.string(), "",
                 fmt::format("{} of {} frames could be decoded: {}", done, missing.size(), complaint),

@@ -44,8 +44,6 @@ class VideoFrames {
   bool isComplete() const;  // whether all frames chosen of this origin are there
   void discard() const;     // removes them all, which are of another video or number
 
-  int64_t peakBytes() const { return peakBytes_; }  // of all programs that were run
-
  private:
   struct Decoding;
   fs::path listFile() const { return folder_ / "frames.json"; }
@@ -54,7 +52,6 @@ class VideoFrames {
 
   fs::path video_, folder_;
   VideoFrameOptions options_;
-  int64_t peakBytes_ = 0;
 };
 
 }  // namespace tessera

@@ -7,7 +7,7 @@
 namespace tessera {
 namespace {
 
-StageOutcome takeFrames(VideoFrames& frames, const fs::path& folder, const std::function<bool()>& interrupted) {
+std::string takeFrames(VideoFrames& frames, const fs::path& folder, const std::function<bool()>& interrupted) {
   const auto watch = [&interrupted](Progress& progress) {
     return [&interrupted, &progress](int64_t done) {
       progress.update(done);
@@ -24,7 +24,7 @@ StageOutcome takeFrames(VideoFrames& frames, const fs::path& folder, const std::
   Progress progress("frames", static_cast<int64_t>(frames.chosen()), "frames");
   frames.extract(watch(progress));
   const std::string length = stream.seconds > 0 ? fmt::format(" of {:.1f} s", stream.seconds) : "";
-  return {frames.peakBytes(), fmt::format("{} frames of a video{}, in {}", frames.chosen(), length, folder.string())};
+  return fmt::format("{} frames of a video{}, in {}", frames.chosen(), length, folder.string());
 }
 
 }  // namespace

@@ -35,6 +35,8 @@
 namespace tessera {
 namespace {
 
+constexpr const char* kEvaluatedExposures = "auto";  // of `eval`: predicted from EXIF where they can be
+
 // Whether reading a file throws no Error.
 bool isReadable(const std::function<void()>& read) {
   try {
@@ -101,6 +103,7 @@ class PhotoRun {
         {.name = "remapping",
          .settings = "",
          .discard = [this] { models_->discardJoined(); },
+         .needs = [this](bool) { return remappingNeeds(); },
          .run = [this](bool resumes) { return remapping(resumes); }},
         {.name = "adjusting",
          .settings = "",
@@ -137,7 +140,7 @@ class PhotoRun {
          .needs = [this](bool) { return planner_.needs().bake; },
          .run = [this](bool) { return bake(); }},
         {.name = "evaluate",
-         .settings = "",
+         .settings = std::string("--exposure ") + kEvaluatedExposures,
          .isComplete = [this] { return !hasHoldOut() || (has("eval.json")() && has("evaluation.html")()); },
          .needs = [this](bool) { return planner_.needs().evaluate; },
          .run = [this](bool) { return evaluate(); }},
@@ -160,10 +163,10 @@ class PhotoRun {
     Stage frames = frames_->stage();
     frames.revealsNeeds = true;
     frames.run = [this, take = frames.run](bool resumes) {
-      const StageOutcome outcome = take(resumes);
+      std::string summary = take(resumes);
       list();
       announcePlan(planStages(options_.out, this->stages(), options_.range), options_.out);
-      return outcome;
+      return summary;
     };
     stages.insert(stages.begin(), std::move(frames));
   }
@@ -228,20 +231,20 @@ class PhotoRun {
     return posed_ ? posed_->holdsOut() : options_.holdout != "none";
   }
 
-  StageOutcome inspect() {
+  std::string inspect() {
     size_t withGps = 0;
     for (const ListedPhoto& photo : list_.photos) withGps += photo.tags.gps ? 1 : 0;
-    return {0, fmt::format("{} photos, {} with GPS, {} left out; {} cameras, {} flights", list_.photos.size(), withGps,
-                           list_.leftOut.size(), list_.bodies.size(), list_.flights)};
+    return fmt::format("{} photos, {} with GPS, {} left out; {} cameras, {} flights", list_.photos.size(), withGps,
+                       list_.leftOut.size(), list_.bodies.size(), list_.flights);
   }
 
-  StageOutcome features() {
+  std::string features() {
     Progress progress("features", static_cast<int64_t>(list_.photos.size()), "photos");
     matches_->extractFeatures(watch(progress));
-    return {matches_->takePeakBytes(), fmt::format("{} photos", list_.photos.size())};
+    return fmt::format("{} photos", list_.photos.size());
   }
 
-  StageOutcome pairs() {
+  std::string pairs() {
     LookAlikes lookAlikes;
     if (needsLookAlikes(list_)) {
       try {
@@ -258,29 +261,28 @@ class PhotoRun {
     const ChosenPairs chosen{photosDigest_, choosePairs(list_, lookAlikes), lookAlikes};
     writePairs(pairsFile(), chosen);
     estimator_->setPairs(chosen.pairs.size());
-    return {matches_->takePeakBytes(),
-            fmt::format("{} of {}", chosen.pairs.size(), list_.photos.size() * (list_.photos.size() - 1) / 2)};
+    return fmt::format("{} of {}", chosen.pairs.size(), list_.photos.size() * (list_.photos.size() - 1) / 2);
   }
 
-  StageOutcome matches() {
+  std::string matches() {
     const std::vector<PhotoPair> chosen = readPairs(pairsFile(), list_.photos.size()).pairs;
     Progress progress("matches", static_cast<int64_t>(chosen.size()), "pairs");
     matches_->match(chosen, watch(progress));
     const size_t linked = matches_->linkedPairs();
-    return {matches_->takePeakBytes(), fmt::format("{} of {} pairs show the same places", linked, chosen.size())};
+    return fmt::format("{} of {} pairs show the same places", linked, chosen.size());
   }
 
   std::string placedText(size_t unplaced) const {
     return fmt::format("{} of {} photos", list_.photos.size() - unplaced, list_.photos.size());
   }
 
-  StageOutcome mapping(bool resumes) {
+  std::string mapping(bool resumes) {
     Progress progress("mapping", static_cast<int64_t>(list_.photos.size()), "photos");
     models_->map(resumes, watch(progress));
     const PhotoModels::Count count = models_->countMapped();
     std::string summary = placedText(list_.photos.size() - count.photos);
     if (count.models > 1) summary += fmt::format(", in {} models", count.models);
-    return {models_->takePeakBytes(), summary};
+    return summary;
   }
 
   int join() {
@@ -296,12 +298,25 @@ class PhotoRun {
     }
   }
 
+  // Nothing as long as there is no model that could lack photos.
+  StageNeeds remappingNeeds() {
+    if (!has("poses/sparse")()) return {};
+    try {
+      const std::vector<int> missing = models_->unplaced();
+      if (missing.empty()) return {};
+      const LookAlikes lookAlikes = readPairs(pairsFile(), list_.photos.size()).lookAlikes;
+      return estimator_->remappingNeeds(missing.size(), chooseMorePairs(list_, lookAlikes, missing).size());
+    } catch (const Error&) {  // of other photos, or damaged: they are written again before
+      return {};
+    }
+  }
+
   // A second round for what the first has left.
-  StageOutcome remapping(bool resumes) {
+  std::string remapping(bool resumes) {
     const bool wasJoined = resumes && has("poses/joined")();
     const int joined = wasJoined ? 0 : join();
     const std::vector<int> missing = models_->unplaced();
-    if (missing.empty() && joined == 0 && !wasJoined) return {0, "not needed"};
+    if (missing.empty() && joined == 0 && !wasJoined) return "not needed";
     if (!missing.empty()) {
       inform("{} photos could not be placed; they are compared with more of the others", missing.size());
       try {
@@ -320,31 +335,31 @@ class PhotoRun {
     std::string summary = placedText(models_->unplaced().size());
     if (wasJoined) summary += ", models joined before";
     if (joined > 0) summary += fmt::format(", {} models joined with the largest", joined);
-    return {std::max(matches_->takePeakBytes(), models_->takePeakBytes()), summary};
+    return summary;
   }
 
-  StageOutcome adjusting() {
+  std::string adjusting() {
     models_->adjust([this](int64_t) { stopIfInterrupted(); });
     const std::vector<LeftOutPhoto> unplaced = matches_->explain(models_->unplaced(), models_->placedApart());
     warnLeftOut(unplaced);
     writeLeftOut(leftOutFile(), unplaced);
-    return {models_->takePeakBytes(), placedText(unplaced.size())};
+    return placedText(unplaced.size());
   }
 
-  StageOutcome georeferencing() {
+  std::string georeferencing() {
     const SourceCapture source = models_->read();
     std::string reason;
     const auto fit = georeference(source.capture.photos, source.flight, reason);
     writeGeoreference(georeferenceFile(), fit, reason, source);
-    if (!fit) return {0, "none: " + reason};
+    if (!fit) return "none: " + reason;
     if (fit->isBent()) {
       warn(
           "the heights of GPS bend by {:.1f} m ± {:.1f} m from the middle of the photos to the farthest: the poses "
           "form a {}; photos that look aslant, or lines that cross at another height, prevent it",
           fit->bend->metres, fit->bend->error, fit->bend->metres > 0 ? "dome" : "bowl");
     }
-    return {0, fmt::format("{} of {} GPS fixes agree; standard errors: {:.2f} % of the scale, {:.2f}°, {:.2f} m",
-                           fit->inliers, fit->fixes, 100 * fit->scaleError, fit->rotationError, fit->middleError)};
+    return fmt::format("{} of {} GPS fixes agree; standard errors: {:.2f} % of the scale, {:.2f}°, {:.2f} m",
+                       fit->inliers, fit->fixes, 100 * fit->scaleError, fit->rotationError, fit->middleError);
   }
 
   int downscale() const {
@@ -357,7 +372,7 @@ class PhotoRun {
   }
   std::optional<Capture> captureBeforehand() const { return posed_ ? posed_->capture() : captureFromTags(list_); }
 
-  StageOutcome capture() {
+  std::string capture() {
     SourceCapture source = posed_ ? posed_->take(out("poses")) : models_->read();
     std::set<std::string> dropped;
     const Capture capture = importSource(std::move(source), options_.photos.string(), out("capture"),
@@ -369,8 +384,8 @@ class PhotoRun {
     planner_.captureIsWritten();
     addLeftOut(leftOutFile(), dropped, "damaged: it ends early, or cannot be decoded");
     const std::string size = downscale() > 1 ? fmt::format(", made smaller by {}", downscale()) : "";
-    return {0, fmt::format("{} photos, {} held out{}{}", capture.photos.size(), capture.photosIn(Split::test).size(),
-                           capture.geo ? ", georeferenced" : "", size)};
+    return fmt::format("{} photos, {} held out{}{}", capture.photos.size(), capture.photosIn(Split::test).size(),
+                       capture.geo ? ", georeferenced" : "", size);
   }
 
   // A model that was trained on something else or in another way is kept beside the new one.
@@ -384,7 +399,7 @@ class PhotoRun {
     inform("{} is kept as {}", out("model").string(), earlier.string());
   }
 
-  StageOutcome train() {
+  std::string train() {
     std::vector<std::string> arguments{out("capture").string(), out("model").string(), "--method", options_.method,
                                        "--resume"};
     if (options_.steps > 0) {
@@ -394,27 +409,30 @@ class PhotoRun {
     }
     inform("to watch the training: tail -f {}", (options_.out / "logs" / "train.log").string());
     checkRoom({{{"train", planner_.trainNeeds(true)}, {"bake", planner_.needs().bake}}}, options_.out);
-    const StageOutcome outcome = runVerb(options_, "train", arguments);
+    std::string summary = runVerb(options_, "train", arguments);
     planner_.modelIsTrained();
-    return outcome;
+    return summary;
   }
 
-  StageOutcome bake() {
+  std::string bake() {
+    // Written in this way, a name may begin with a dash.
+    const std::string name = "--name=" + fs::weakly_canonical(options_.out).filename().string();
     return runVerb(options_, "bake",
-                   {out("model").string(), out("scene").string(), "--capture", out("capture").string()});
+                   {out("model").string(), out("scene").string(), "--capture", out("capture").string(), name});
   }
 
-  StageOutcome evaluate() {
-    if (!hasHoldOut()) return {0, "no photo is held out"};
-    StageOutcome outcome = runVerb(options_, "eval",
-                                   {out("scene").string(), out("capture").string(), "--json", out("eval.json").string(),
-                                    "--report", out("evaluation.html").string()});
+  std::string evaluate() {
+    if (!hasHoldOut()) return "no photo is held out";
+    runVerb(options_, "eval",
+            {out("scene").string(), out("capture").string(), "--json", out("eval.json").string(), "--report",
+             out("evaluation.html").string(), "--exposure", kEvaluatedExposures});
     const auto result = nlohmann::json::parse(readTextFile(out("eval.json")));
     // It has none if the views show nothing that is compared.
-    outcome.summary = result.is_object() && result.contains("psnr") && result["psnr"].is_number()
-                          ? fmt::format("held-out PSNR {:.2f} dB", result["psnr"].get<double>())
-                          : "no held-out PSNR: the views show nothing that is compared";
-    return outcome;
+    if (!result.is_object() || !result.contains("psnr") || !result["psnr"].is_number())
+      return "no held-out PSNR: the views show nothing that is compared";
+    const std::string exposure = result.value("exposure", "neutral");
+    return fmt::format("held-out PSNR {:.2f} dB{}", result["psnr"].get<double>(),
+                       exposure == "neutral" ? "" : ", exposures " + exposure);
   }
 
   // What only the report reads, and folders of earlier versions lack, is not worth training again.
@@ -430,7 +448,7 @@ class PhotoRun {
     if (!hasGeoreference) georeferencing();
   }
 
-  StageOutcome report() {
+  std::string report() {
     restoreReported();
     const fs::path folder = fs::absolute(options_.photos / "").lexically_normal().parent_path();
     writeFileAtomically(out("report.html"), runReport(options_.out, {.title = folder.filename().string(),
@@ -439,7 +457,7 @@ class PhotoRun {
                                                                      .leftOut = list_.leftOut,
                                                                      .hasEvaluation = hasHoldOut()}));
     inform("to look at the scene: tessera serve {}", out("scene").string());
-    return {0, out("report.html").string()};
+    return out("report.html").string();
   }
 
   PhotoRunOptions options_;

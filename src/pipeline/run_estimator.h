@@ -22,6 +22,8 @@ class RunEstimator {
   MatchingNeeds matchingNeeds();
   StageNeeds featureNeeds(bool resumes);
   StageNeeds matchNeeds(bool resumes);
+  // Those of comparing so many more pairs, and of placing the photos that are missing in the model.
+  StageNeeds remappingNeeds(size_t missing, size_t pairs);
 
   // From now on, the number of pairs is known.
   void setPairs(size_t pairs) { expectedPairs_ = static_cast<int64_t>(pairs); }

@@ -76,12 +76,12 @@ MatchingRates probe(const PhotoList& chosen, int threads, const fs::path& folder
 
 MatchingRates measureMatchingRates(const PhotoList& list, int threads, const fs::path& folder,
                                    const std::function<void()>& look) {
+  ColmapProgram(folder / "probe.log");  // throws if there is none that can be used
   if (list.photos.size() < kFewestToProbe) return {};
   std::error_code status;
   fs::remove_all(folder, status);
   fs::create_directories(folder, status);
   if (status) throw Error(folder.string(), "", "cannot be made: " + status.message(), "name another folder");
-  ColmapProgram(folder / "probe.log");  // throws if there is none that can be used
   MatchingRates rates;
   try {
     inform("a few photos are tried, to tell how long all will take");
@@ -133,7 +133,7 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
   constexpr double kMapping = 0.187, kMappingGrowth = 1.274, kAdjusting = 0.0243, kAdjustingGrowth = 1.316;
   constexpr double kMargin = 1.4;        // of inliers and features, for memory, before they are known
   constexpr double kOfNeighbours = 0.6;  // inliers of all pairs, relative to those of neighbours
-  constexpr double kSecondsPerWordFeature = 0.28e-3, kPhotosForWords = 60, kLookAlikeSeconds = 0.15;
+  constexpr double kSecondsPerWordFeature = 0.3e-3, kPhotosForWords = 60, kLookAlikeSeconds = 0.3;
   constexpr int64_t kBytesPerFeature = 155, kBytesPerInlier = 16, kModelBytesPerInlier = 31, kModels = 4;
   constexpr int64_t kMapperBytesPerInlier = 560, kMapperBytesPerFeature = 115;
   const double speed = relativeSeconds(rates);

@@ -16,7 +16,7 @@ class RunRequests : public testing::Test {
   }
 
   void runWith(const PhotoRunOptions& options) {
-    const Stage stage{.name = "one", .run = [](bool) { return StageOutcome{}; }};
+    const Stage stage{.name = "one", .run = [](bool) { return ""; }};
     runStages(folder_.path(), describeRequest(options), {stage}, {.from = "one"});
   }
   PhotoRunOptions adopt(const std::set<std::string>& given) {
@@ -54,7 +54,7 @@ TEST_F(RunRequests, KeepTheFlagsOfTheRunBefore) {
 }
 
 TEST_F(RunRequests, AreKeptOfACallThatFindsEverythingDone) {
-  const Stage stage{.name = "one", .run = [](bool) { return StageOutcome{0, "done"}; }};
+  const Stage stage{.name = "one", .run = [](bool) { return "done"; }};
   PhotoRunOptions options = options_;
   options.masks = "masks";
   runStages(folder_.path(), describeRequest(options), {stage}, {});

@@ -262,25 +262,23 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
     const bool measuresPeak = restartPeakResidentBytes();
     takePeakOfChildren();
     const auto start = std::chrono::steady_clock::now();
-    const auto count = [&](int64_t peakOfPrograms) {
+    const auto count = [&] {
       result.seconds = before.seconds + std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-      result.peakBytes = std::max({before.peakBytes, peakOfPrograms, takePeakOfChildren(),
-                                   measuresPeak ? peakResidentBytes() : residentBytes()});
+      result.peakBytes =
+          std::max({before.peakBytes, takePeakOfChildren(), measuresPeak ? peakResidentBytes() : residentBytes()});
     };
-    StageOutcome outcome;
     try {
-      outcome = stage.run(resumes);
+      result.summary = stage.run(resumes);
     } catch (...) {
-      count(0);
+      count();
       try {
         recordBegun();
       } catch (const Error&) {  // what ended the stage matters more
       }
       throw;
     }
-    count(outcome.peakBytes);
+    count();
     result.isFinished = true;
-    result.summary = outcome.summary;
     RunPlan later;
     for (size_t k = i + 1; k < remaining.end; ++k) later.entries.push_back({stages[k].name, stages[k].needs(false)});
     const double left = later.total().seconds;

@@ -12,11 +12,6 @@
 
 namespace tessera {
 
-struct StageOutcome {
-  int64_t peakBytes = 0;  // of memory, of the programs that the stage ran; 0: it ran none
-  std::string summary;    // what it achieved, for the line that is printed
-};
-
 // What a stage will take.
 struct StageNeeds {
   double seconds = 0;
@@ -36,16 +31,16 @@ struct Stage {
   std::function<StageNeeds(bool resumes)> needs = [](bool) { return StageNeeds{}; };
   // Whether what later stages need is only known after it: run.json then records what they are expected to take.
   bool revealsNeeds = false;
-  // `resumes`: it was interrupted, and nothing that its result depends on has changed since: what it has written so far
-  // may be used.
-  std::function<StageOutcome(bool resumes)> run;
+  // Returns what it achieved, for the line that is printed. `resumes`: it was interrupted, and nothing that its result
+  // depends on has changed since: what it has written so far may be used.
+  std::function<std::string(bool resumes)> run;
 };
 
 // What run.json says of a stage that is finished.
 struct StageRecord {
   std::string name, summary;
   double seconds = 0;
-  int64_t peakBytes = 0;
+  int64_t peakBytes = 0;  // of memory, of this process or of a program that the stage ran, the larger one
 };
 
 struct StageRange {

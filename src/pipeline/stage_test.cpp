@@ -33,7 +33,7 @@ class Stages : public testing::Test {
                             [this, &ran, name](bool resumes) {
                               if (name == failing_) throw Error(name, "", "fails", "repair it");
                               ran += (resumes ? "resumed " : "") + name + " ";
-                              return StageOutcome{0, "done"};
+                              return "done";
                             }});
     }
     try {
@@ -62,15 +62,13 @@ TEST_F(Stages, DiscardWhatTheyLeftBeforeTheyMayBeResumed) {
 }
 
 TEST_F(Stages, HaveNamesThatNeedNotBeUtf8) {
-  const auto stage = [] {
-    return StageOutcome{0,
-                        "photos of S\xfc"
-                        "dstadt"};
-  };
+  const std::string summary =
+      "photos of S\xfc"
+      "dstadt";
   EXPECT_NO_THROW(runStages(folder_.path(),
                             {"run S\xfc"
                              "d"},
-                            {{.name = "one", .run = [&](bool) { return stage(); }}}, {}));
+                            {{.name = "one", .run = [&](bool) { return summary; }}}, {}));
 }
 
 TEST_F(Stages, LeaveTheFlagsThatTheyWereRunWith) {
@@ -88,7 +86,7 @@ TEST_F(Stages, CountTheTimeOfInterruptedAttempts) {
   const std::vector<Stage> stages = {{.name = "one", .run = [&](bool) {
                                         std::this_thread::sleep_for(std::chrono::milliseconds(100));
                                         if (++attempts < 3) throw Error("one", "", "fails", "repair it");
-                                        return StageOutcome{0, "done"};
+                                        return "done";
                                       }}};
   for (int i = 0; i < 2; ++i) EXPECT_THROW(runStages(folder_.path(), {}, stages, {}), Error);
   runStages(folder_.path(), {}, stages, {});
@@ -160,7 +158,7 @@ TEST_F(Stages, AreNotBegunIfTheCheckThrows) {
   const auto stage = [&](const char* name) {
     return Stage{.name = name, .run = [&ran, name](bool) {
                    ran += name;
-                   return StageOutcome{};
+                   return "";
                  }};
   };
   EXPECT_THROW(runStages(folder_.path(), {"test"}, {stage("a"), stage("b")}, {},
@@ -195,11 +193,11 @@ TEST_F(Stages, RecordTheMemoryOfProgramsAlsoIfTheyFail) {
           const bool begins = process.start({"dd", "if=/dev/zero", "of=/dev/null", "bs=64M", "count=1"}).empty();
           if (begins) process.wait();
           if (fails || !begins) throw Error("one", "", "fails", "run again");
-          return StageOutcome{};
+          return "";
         }};
   };
   EXPECT_THROW(runStages(folder_.path(), {"test"}, {runs(true)}, {}), Error);
-  const Stage quick{.name = "one", .run = [](bool) { return StageOutcome{}; }};
+  const Stage quick{.name = "one", .run = [](bool) { return ""; }};
   runStages(folder_.path(), {"test"}, {quick}, {});
   const auto records = readStageRecords(folder_.path());
   ASSERT_EQ(records.size(), 1u);
@@ -211,14 +209,14 @@ TEST_F(Stages, ReadWhatIsRecordedOfThoseBeforeThem) {
   const auto stage = [&](const char* name) {
     return Stage{.name = name, .run = [&, name](bool) {
                    records = readStageRecords(folder_.path());
-                   return StageOutcome{int64_t{1} << 50, std::string("summary of ") + name};
+                   return std::string("summary of ") + name;
                  }};
   };
   runStages(folder_.path(), {"test"}, {stage("a"), stage("b"), stage("c")}, {});
   ASSERT_EQ(records.size(), 2u) << "that of the stage itself is not finished";
   EXPECT_EQ(records[1].name, "b");
   EXPECT_EQ(records[1].summary, "summary of b");
-  EXPECT_EQ(records[1].peakBytes, int64_t{1} << 50);
+  EXPECT_GT(records[1].peakBytes, 0);
   runStages(folder_.path(), {"test"}, {stage("a"), stage("b"), stage("c")}, {.from = "c"});
   EXPECT_EQ(records.size(), 2u) << "finished before";
   writeFileAtomically(folder_ / "run.json", "{");
@@ -247,7 +245,7 @@ std::vector<Stage> minutesEach(const std::function<void(const std::string&)>& ru
                       .run =
                           [run, name](bool) {
                             run(name);
-                            return StageOutcome{0, "done"};
+                            return "done";
                           }});
   }
   return stages;

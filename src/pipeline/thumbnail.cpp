@@ -24,22 +24,6 @@ ImageU8 withoutAlpha(ImageU8 image) {
 
 }  // namespace
 
-ImageU8 turnUpright(const ImageU8& image, int orientation) {
-  if (orientation <= 1 || orientation > 8) return image;
-  const bool isTransposed = orientation >= 5;
-  const bool fromRight = orientation == 2 || orientation == 3 || orientation == 7 || orientation == 8;
-  const bool fromBottom = orientation == 3 || orientation == 4 || orientation == 6 || orientation == 7;
-  ImageU8 upright(isTransposed ? image.height : image.width, isTransposed ? image.width : image.height, image.channels);
-  for (int y = 0; y < upright.height; ++y) {
-    for (int x = 0; x < upright.width; ++x) {
-      const int column = isTransposed ? y : x, row = isTransposed ? x : y;
-      std::copy_n(image.at(fromRight ? image.width - 1 - column : column, fromBottom ? image.height - 1 - row : row),
-                  image.channels, upright.at(x, y));
-    }
-  }
-  return upright;
-}
-
 std::optional<Thumbnail> makeThumbnail(const fs::path& photo, int orientation, int longestSide) {
   try {
     const ImageU8 image = withoutAlpha(readImage(photo).image);

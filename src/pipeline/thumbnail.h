@@ -8,9 +8,6 @@
 
 namespace tessera {
 
-// Returns the picture as viewers show it. `orientation`: of EXIF, 1 to 8; others mean 1.
-ImageU8 turnUpright(const ImageU8& image, int orientation);
-
 struct Thumbnail {
   int width = 0, height = 0;
   Bytes jpeg;

@@ -16,16 +16,16 @@ namespace {
 
 constexpr std::array kInterruptions = {SIGINT, SIGTERM, SIGHUP};
 
-// Whether a verb says that it has ended for such a signal, or was ended by it.
-bool endsBySignal(const std::string& end, int signal) {
+// Whether a verb has ended for an interruption, by itself or without being asked.
+bool isInterrupted(const ChildProcess& process) {
   constexpr int kStatus = 128;  // interruptedStatus
-  return end == fmt::format("ended with status {}", kStatus + signal) ||
-         end == fmt::format("was ended by signal {}", signal);
+  return std::any_of(kInterruptions.begin(), kInterruptions.end(),
+                     [&](int signal) { return process.signal() == signal || process.status() == kStatus + signal; });
 }
 
 }  // namespace
 
-StageOutcome runVerb(const PhotoRunOptions& options, const std::string& verb, std::vector<std::string> arguments) {
+std::string runVerb(const PhotoRunOptions& options, const std::string& verb, std::vector<std::string> arguments) {
   const fs::path log = options.out / "logs" / (verb + ".log");
   arguments.insert(arguments.begin(), {options.program, verb, "--device", options.device});
   if (options.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(options.threads)});
@@ -50,14 +50,12 @@ StageOutcome runVerb(const PhotoRunOptions& options, const std::string& verb, st
   if (!end.empty()) {
     if (options.interrupted()) {
       // What else went wrong is lost with the interruption, such as a checkpoint for which there was no space.
-      const bool isInterruption = std::any_of(kInterruptions.begin(), kInterruptions.end(),
-                                              [&](int signal) { return endsBySignal(end, signal); });
-      if (!isInterruption) warn("tessera {} {}: {}", verb, end, lastLine());
+      if (!isInterrupted(process)) warn("tessera {} {}: {}", verb, end, lastLine());
       throw RunInterrupted();
     }
     throw Error("tessera " + verb, "", end + ": " + lastLine(), "see " + log.string() + "; run again to go on");
   }
-  return {process.peakBytes(), lastLine()};
+  return lastLine();
 }
 
 }  // namespace tessera

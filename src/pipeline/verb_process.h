@@ -11,6 +11,6 @@ namespace tessera {
 // Runs `tessera VERB --device ... ARGUMENTS`. Its messages are in OUT/logs/VERB.log, and the last one is shown
 // meanwhile, and returned as the summary. An interruption is passed on. Throws RunInterrupted if it has ended the verb,
 // and Error if the verb cannot be run or fails.
-StageOutcome runVerb(const PhotoRunOptions& options, const std::string& verb, std::vector<std::string> arguments);
+std::string runVerb(const PhotoRunOptions& options, const std::string& verb, std::vector<std::string> arguments);
 
 }  // namespace tessera

@@ -33,6 +33,12 @@ struct Pose {
   Pose inverse() const { return {rotation.transpose(), -(rotation.transpose() * translation)}; }
 };
 
+// Returns the inverse of an affine map. Its last row is (0, 0, 0, 1) exactly, as files of scenes need it; that of a
+// general inverse may differ from it by a rounding error.
+inline Mat4d affineInverse(const Mat4d& map) {
+  return Eigen::Affine3d(map).inverse().matrix();
+}
+
 // Negates the second and third camera axis, which converts between RDF and the OpenGL axes of NeRF files (right, up,
 // backward), in either direction.
 inline Mat3d flippedYz(const Mat3d& rotation) {

@@ -32,6 +32,8 @@ struct Photo {
   float depthUnit = 0.001f;     // world units per step of an integer depth PNG
   Split split = Split::train;
   double exposure = 0;  // log2 gain relative to the capture's mean, 0 when unknown
+  // Of EXIF, 1 to 8: how people look at it. Its pixels, camera and pose are those of the picture as it is stored.
+  int orientation = 1;
   std::optional<GpsFix> gps;
 };
 

@@ -120,6 +120,7 @@ Json frameToJson(const Capture& capture, const Photo& photo) {
   ours["camera"] = photo.camera;
   if (photo.name != frame["file_path"].get<std::string>()) ours["name"] = photo.name;
   if (photo.exposure != 0) ours["exposure"] = photo.exposure;
+  if (photo.orientation != 1) ours["orientation"] = photo.orientation;
   if (!photo.depth.empty()) ours["depth_unit"] = photo.depthUnit;
   if (photo.gps) {
     ours["gps"] = {{"latitude", photo.gps->latitude},
@@ -158,7 +159,7 @@ void writeCapture(const Capture& capture) {
   if (capture.cameras.size() == 1) addIntrinsics(json, capture.cameras[0]);
   if (!capture.points.empty()) {
     json["ply_file_path"] = "points.ply";
-    writeFileAtomically(capture.root / "points.ply", encodePly(capture.points));
+    writeFileAtomically(capture.root / "points.ply", encodePly(capture.points), true);
   }
   Json frames = Json::array();
   std::array<Json, 3> names = {Json::array(), Json::array(), Json::array()};
@@ -183,7 +184,7 @@ void writeCapture(const Capture& capture) {
   }
   if (!capture.observations.empty()) {
     ours["observations"] = "observations.safetensors";
-    writeFileAtomically(capture.root / "observations.safetensors", encodeObservations(capture.observations));
+    writeFileAtomically(capture.root / "observations.safetensors", encodeObservations(capture.observations), true);
   }
   json["frames"] = std::move(frames);
   std::string text;
@@ -192,7 +193,7 @@ void writeCapture(const Capture& capture) {
   } catch (const Json::type_error&) {
     throw Error((capture.root / "transforms.json").string(), "", "a photo's name is not UTF-8", "rename it");
   }
-  writeFileAtomically(capture.root / "transforms.json", text);
+  writeFileAtomically(capture.root / "transforms.json", text, true);
 }
 
 }  // namespace tessera

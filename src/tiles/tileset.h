@@ -150,6 +150,10 @@ uint32_t coarsestLevel(const Tileset& tileset);
 // height range, wherever the grid's origin is.
 void placeOn(Tileset& tileset, const BlockGrid& grid);
 
+// Returns the first rule of docs/tile-format.md that its frames, its grid, its background or its georeference violate,
+// for people, or nothing: what is known before there are tiles.
+std::optional<std::string> frameError(const Tileset& tileset);
+
 // Returns the first rule of docs/tile-format.md that the tileset violates, for people, or nothing if it is valid.
 std::optional<std::string> validationError(const Tileset& tileset);
 

@@ -110,7 +110,8 @@ Error tooLarge(const std::string& why) {
   return {"tileset.json", "", why, "train with fewer --blocks"};
 }
 
-// Throws Error for violations that settings can cause. Any other violation is a bug in this program.
+}  // namespace
+
 void requireWritable(const Tileset& tileset) {
   if (!(tileset.near >= 0 && tileset.near <= 1)) {
     throw Error("tileset.json", fmt::format("near={}", tileset.near), "is not between 0 and 1, in halves of a block",
@@ -124,8 +125,6 @@ void requireWritable(const Tileset& tileset) {
     throw tooLarge(fmt::format("would have {} tiles, and readers take {} at most", tileset.tiles.size(), limits.tiles));
   }
 }
-
-}  // namespace
 
 SceneBox enclosingBox(const Tile& tile) {
   SceneBox box = tile.box;

@@ -20,6 +20,9 @@ struct TilesetLimits {
   uint32_t contentsOfTile = 64, resources = 1 << 16, coverage = 1 << 16;
 };
 
+// Throws Error for violations that settings can cause: of the bounds of `near`, cells and tiles.
+void requireWritable(const Tileset& tileset);
+
 // The same tileset gives the same text. Throws Error if it exceeds what readers accept or its `near` is out of bounds,
 // both of which settings can cause. CHECKs that it violates no other rule.
 std::string encodeTileset(const Tileset& tileset);

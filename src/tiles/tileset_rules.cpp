@@ -71,30 +71,6 @@ bool lieOnGrid(const std::vector<CellRange>& ranges) {
   return true;
 }
 
-Broken ruleOfFrames(const Tileset& tileset) {
-  if (!isRotation(tileset.worldFromScene.rotation)) return "worldFromScene's rotation is not a rotation";
-  if (!isScale(tileset.worldFromScene.scale)) return "worldFromScene's scale is not above zero";
-  if (!isPlace(tileset.worldFromScene.translation)) return "worldFromScene's translation is out of bounds";
-  if (!isAffine(tileset.sourceFromWorld)) return "sourceFromWorld is not affine";
-  if (tileset.columns < 1 || tileset.columns > kMaxCells || tileset.rows < 1 || tileset.rows > kMaxCells) {
-    return "the grid's columns or rows are out of bounds";
-  }
-  if (!(tileset.bottom >= -kHighest && tileset.bottom < tileset.top && tileset.top <= kHighest)) {
-    return "the grid's heights are not within -16 and 16";
-  }
-  if (!(tileset.near >= 0 && tileset.near <= 1)) return "near is not between 0 and 1";
-  for (const float channel : tileset.background) {
-    if (!(channel >= 0 && channel <= 1)) return "the background is not a colour";
-  }
-  if (const auto& geo = tileset.georeference) {
-    if (!(std::abs(geo->latitude) <= 90 && std::abs(geo->longitude) <= 180 && std::abs(geo->altitude) <= 1e5)) {
-      return "the georeference is not a place on the Earth";
-    }
-    if (!isSimilarity(geo->enuFromWorld)) return "the georeference's enuFromWorld is not a similarity";
-  }
-  return std::nullopt;
-}
-
 bool isName(std::string_view name) {
   const auto isPlain = [](char c) { return (c >= 'a' && c <= 'z') || (c >= '0' && c <= '9') || c == '_'; };
   return !name.empty() && name.size() <= kMaxNameLength && std::all_of(name.begin(), name.end(), isPlain);
@@ -235,11 +211,35 @@ std::optional<uint32_t> tileBeyondItsCells(const Tileset& tileset) {
   return std::nullopt;
 }
 
+std::optional<std::string> frameError(const Tileset& tileset) {
+  if (!isRotation(tileset.worldFromScene.rotation)) return "worldFromScene's rotation is not a rotation";
+  if (!isScale(tileset.worldFromScene.scale)) return "worldFromScene's scale is not above zero";
+  if (!isPlace(tileset.worldFromScene.translation)) return "worldFromScene's translation is out of bounds";
+  if (!isAffine(tileset.sourceFromWorld)) return "sourceFromWorld is not affine";
+  if (tileset.columns < 1 || tileset.columns > kMaxCells || tileset.rows < 1 || tileset.rows > kMaxCells) {
+    return "the grid's columns or rows are out of bounds";
+  }
+  if (!(tileset.bottom >= -kHighest && tileset.bottom < tileset.top && tileset.top <= kHighest)) {
+    return "the grid's heights are not within -16 and 16";
+  }
+  if (!(tileset.near >= 0 && tileset.near <= 1)) return "near is not between 0 and 1";
+  for (const float channel : tileset.background) {
+    if (!(channel >= 0 && channel <= 1)) return "the background is not a colour";
+  }
+  if (const auto& geo = tileset.georeference) {
+    if (!(std::abs(geo->latitude) <= 90 && std::abs(geo->longitude) <= 180 && std::abs(geo->altitude) <= 1e5)) {
+      return "the georeference is not a place on the Earth";
+    }
+    if (!isSimilarity(geo->enuFromWorld)) return "the georeference's enuFromWorld is not a similarity";
+  }
+  return std::nullopt;
+}
+
 std::optional<std::string> validationError(const Tileset& tileset) {
   if (tileset.tiles.empty()) return "there are no tiles";
   if (tileset.levels < 1 || tileset.levels > kMaxLevels) return "the number of levels is out of bounds";
   if (!isName(tileset.representation)) return "the representation's name is not valid";
-  if (auto broken = ruleOfFrames(tileset)) return broken;
+  if (auto broken = frameError(tileset)) return broken;
   if (auto broken = ruleOfResources(tileset)) return broken;
   if (auto broken = ruleOfCoverage(tileset)) return broken;
   if (auto broken = ruleOfExposureResponse(tileset)) return broken;

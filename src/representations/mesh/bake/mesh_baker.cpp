@@ -110,7 +110,8 @@ class MeshBaker final : public Baker {
         tilesPerBlock_ > 1 ? "bake with a lower --tiles-per-block" : "train with fewer and larger --blocks";
     const std::string what = fmt::format("--tiles-per-block {}", tilesPerBlock_);
     if (description().near > 1)
-      throw Error(what, "", "the distance from cameras that has no triangles is longer than half a tile", remedy);
+      throw Error(what, "", "the distance from cameras that has no triangles is longer than half a tile",
+                  tilesPerBlock_ > 1 ? remedy : "train with a lower --set near");
     constexpr int kMaxAlong = 4096;
     // Of the finest level; coarser ones add a third, and tileset.json must stay within its limits.
     constexpr int64_t kMaxTiles = 5000;

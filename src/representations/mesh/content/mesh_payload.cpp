@@ -12,7 +12,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kRemedy = "train with a lower --set mesh_cells, or bake with fewer --texels";
+constexpr const char* kRemedy =
+    "bake with a higher --tiles-per-block or fewer --texels, or train with a lower --set mesh_cells";
 constexpr int kSkyEffort = 9;
 
 Json writeBytes(ContentFileWriter& file, std::span<const std::byte> bytes) {

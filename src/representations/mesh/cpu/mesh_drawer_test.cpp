@@ -132,9 +132,11 @@ TEST_F(DrawMesh, TakesNoMoreMemoryThanItStatesForManyParts) {
 }
 
 TEST_F(DrawMesh, TakesNoMoreMemoryThanItStates) {
-  for (const uint32_t patches : {1u, 100u, 20000u}) {
+  const std::pair<uint32_t, uint32_t> sizes[] = {{1, 8}, {100, 8}, {20000, 8}, {100, 4}, {100000, 4}};
+  for (const auto [patches, patchEdge] : sizes) {
     PatchSet set = squareSet(0, 0, 1, 1, 0, 0.5f, 255);
     set.patches = set.pairs = patches;
+    set.patchEdge = patchEdge;
     set.vertices.clear();
     for (uint32_t i = 0; i < patches; ++i) {
       const uint16_t x = static_cast<uint16_t>(i % 150 * 7), y = static_cast<uint16_t>(i / 150 * 7),
@@ -147,7 +149,8 @@ TEST_F(DrawMesh, TakesNoMoreMemoryThanItStates) {
     MeshContent mesh{false, 0, {}, {set}};
     const uint64_t decoded = bytesInMemory(mesh), stated = drawer_->residentBytes(decoded);
     const uint64_t resident = prepare(std::move(mesh))->memoryBytes();
-    EXPECT_LE(resident, stated) << patches << " patches, " << decoded << " bytes when decoded";
+    EXPECT_LE(resident, stated) << patches << " patches of " << patchEdge << " texels, " << decoded
+                                << " bytes when decoded";
     EXPECT_GT(resident, decoded);
   }
 }

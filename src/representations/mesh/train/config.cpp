@@ -51,7 +51,7 @@ std::vector<ConfigField> MeshConfig::fields() {
       everyCellSetting(),
       quadsSetting(),
       opacityOffsetSetting(),
-      nearSetting().within(0, ConfigBounds::kHuge),
+      nearSetting(),
       seedSetting(),
       samplesPerStepSetting(),
       firstRaysSetting(),

@@ -170,8 +170,13 @@ Capture addViewsBetween(Capture capture, const fs::path& mesh, uint64_t seed) {
   if (!folder.isComplete()) return capture;
   const nlohmann::json count = folder.readList();
   const size_t photos = capture.photos.size(), most = kMaxViewsPerPhoto * capture.photosIn(Split::train).size();
-  if (!count.is_number_unsigned() || count.get<uint64_t>() > most)
-    throw folder.malformed(fmt::format("is not a number up to {}", most));
+  if (!count.is_number_unsigned()) throw folder.malformed("is not a number");
+  if (count.get<uint64_t>() > most) {
+    throw Error(capture.root.string(), "transforms.json",
+                fmt::format("has too few training photos for the {} views between photos of {}", count.get<uint64_t>(),
+                            mesh.string()),
+                "use the capture that the model was trained on");
+  }
   capture = placeViewsBetween(std::move(capture), count.get<size_t>(), seed);
   for (size_t view = photos; view < capture.photos.size(); ++view) {
     Photo& photo = capture.photos[view];
