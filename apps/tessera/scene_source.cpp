@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "base/error.h"
@@ -117,8 +118,13 @@ class SceneRenderSource final : public RenderSource {
 }  // namespace
 
 uint64_t sceneBudgetBytes(const Device& device) {
-  const uint64_t own = device.ownMemory().bytes;
-  return (own > 0 ? own : static_cast<uint64_t>(usableMemoryBytes())) / 2;
+  if (const uint64_t own = device.ownMemory().bytes; own > 0) return own / 2;
+  auto bytes = static_cast<uint64_t>(usableMemoryBytes());
+#ifdef TESSERA_HAS_VULKAN
+  // A GPU that shares the machine's memory may address a part of it alone.
+  if (const auto context = vulkanContext(device)) bytes = std::min(bytes, context->memoryBytes());
+#endif
+  return bytes / 2;
 }
 
 std::unique_ptr<RenderSource> openScene(const Device& device, const fs::path& folder,

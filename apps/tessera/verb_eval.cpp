@@ -79,8 +79,8 @@ void addEvalVerb(CLI::App& app) {
     options.imagesDir = flags->images;
     options.threads = flags->device.threads;
     const size_t views = capture.photosIn(options.split).size();
-    ReportBuilder builder(
-        fs::path(flags->model).filename().string() + " on " + fs::path(flags->capture).filename().string(), views);
+    const auto name = [](const std::string& folder) { return fs::weakly_canonical(folder).filename().string(); };
+    ReportBuilder builder(name(flags->model) + " on " + name(flags->capture), views);
     Progress progress("evaluating", static_cast<int64_t>(views), "views");
     int64_t done = 0;
     options.onView = [&](const ViewResult& result, const ViewPictures& pictures) {

@@ -50,8 +50,10 @@ ordered_json describeModel(const fs::path& folder) {
   const ModelFolder model(folder);
   const std::optional<ModelManifest> manifest = model.manifest();
   const ModelPlacement placement = model.readPlacement();
-  // A model that has saved nothing yet does not state its method.
-  const Method& method = manifest ? findModelMethod(model, *manifest) : *methods().front();
+  const Method* planned = findMethod(placement.method);  // of a model that has saved nothing yet
+  const Method& method = manifest             ? findModelMethod(model, *manifest)
+                         : planned != nullptr ? *planned
+                                              : *methods().front();
   ordered_json info = {{"kind", "model"},
                        {"method", method.name},
                        {"step", manifest ? manifest->step : 0},

@@ -115,7 +115,7 @@ std::optional<fs::path> resolveInside(const fs::path& root, std::string_view rel
   const fs::path relativePath{std::string(relative)};
   if (relativePath.is_absolute()) return std::nullopt;
   std::error_code status;
-  fs::path realRoot = fs::weakly_canonical(root, status);
+  fs::path realRoot = fs::weakly_canonical(root.empty() ? "." : root, status);
   if (status) return std::nullopt;
   if (!realRoot.has_filename()) realRoot = realRoot.parent_path();  // "out/" that does not exist yet
   const fs::path real = fs::weakly_canonical(realRoot / relativePath, status);

@@ -33,7 +33,7 @@ ImageF colourOver(const ImageF& image, const Eigen::Array3f& background) {
 
 struct ReadPhoto {
   ImageF image;
-  bool hasAlpha = false;
+  bool isTransparent = false;  // somewhere
 };
 
 ReadPhoto readPhoto(const Photo& photo, const Camera& camera, const Eigen::Array3f& background) {
@@ -46,9 +46,11 @@ ReadPhoto readPhoto(const Photo& photo, const Camera& camera, const Eigen::Array
                             decoded.image.height, camera.width, camera.height),
                 "import the capture again");
   }
+  bool isTransparent = false;
+  for (size_t p = 3; decoded.image.channels == 4 && p < decoded.image.pixels.size() && !isTransparent; p += 4)
+    isTransparent = decoded.image.pixels[p] < 255;
   // The photo is composited first, because straight colour must not be averaged where alpha is 0.
-  return {downscaleByArea(colourOver(toFloat(decoded.image), background), camera.width, camera.height),
-          decoded.image.channels == 4};
+  return {downscaleByArea(colourOver(toFloat(decoded.image), background), camera.width, camera.height), isTransparent};
 }
 
 std::optional<ImageU8> readMask(const Photo& photo, const Camera& camera) {
@@ -116,6 +118,10 @@ class ViewEvaluator {
   std::string lpipsNet() const { return lpips_ ? lpips_->net() : std::string(); }
 
   void compare(const ImageF& photo, const ImageF& rendered, const ImageU8* mask, ViewResult& result) {
+    if (mask) {
+      const auto excluded = std::count(mask->pixels.begin(), mask->pixels.end(), uint8_t{0});
+      result.compared = 1 - static_cast<double>(excluded) / static_cast<double>(mask->pixels.size());
+    }
     result.psnr = tessera::psnr(rendered, photo, mask);
     result.ssim = tessera::ssim(rendered, photo, mask);
     if (lpips_ && std::min(photo.width, photo.height) >= lpips_->smallestSide()) {
@@ -126,7 +132,7 @@ class ViewEvaluator {
   ViewResult view(ViewRenderer& renderer, const Photo& photo, const Camera& camera) {
     ViewResult result;
     result.name = photo.name;
-    const auto [target, hasAlpha] = readPhoto(photo, camera, renderer.background());
+    const auto [target, isTransparent] = readPhoto(photo, camera, renderer.background());
 
     const auto start = std::chrono::steady_clock::now();
     const RenderedView view = renderer.render(camera, photo.worldFromCamera);
@@ -135,12 +141,8 @@ class ViewEvaluator {
     CHECK(view.colour.height == camera.height);
     CHECK(view.colour.channels == 3);
     std::optional<ImageU8> mask = readMask(photo, camera);
-    if (!renderer.showsOutside() && !hasAlpha) limitToOpaque(mask, view.opacity);
+    if (!renderer.showsOutside() && !isTransparent) limitToOpaque(mask, view.opacity);
     const ImageU8* maskPointer = mask ? &*mask : nullptr;
-    if (mask) {
-      const auto excluded = std::count(mask->pixels.begin(), mask->pixels.end(), uint8_t{0});
-      result.compared = 1 - static_cast<double>(excluded) / static_cast<double>(mask->pixels.size());
-    }
 
     ImageF rendered = compositeOver(view, renderer.background());
     if (options_.exposures == Exposures::fitted) result.gain = fittedGain(rendered, target, maskPointer);

@@ -23,7 +23,7 @@ struct ViewResult {
   double ssim = 0;
   std::optional<double> lpips;             // nothing without weights, or if the image is too small for the network
   std::optional<DepthError> depth;         // nothing if the photo has no depth map
-  double compared = 1;                     // share of its pixels that were compared
+  double compared = 1;                     // share of its pixels, or of its right half's, that were compared
   std::array<double, 3> gain = {1, 1, 1};  // factor applied to the render; 1 with neutral exposures
   double seconds = 0;                      // time of rendering alone
 };
@@ -79,7 +79,8 @@ struct EvaluationReport {
 // their camera are downscaled by area averaging; photos with alpha are composited over the same background. Where a
 // photo has a mask, its black pixels are excluded from PSNR, windows that touch one are excluded from SSIM, and for
 // LPIPS they are replaced in the render by the photo's pixels. Unless ViewRenderer::showsOutside, pixels of photos
-// without alpha in which the render is less than half opaque are excluded in the same way: they show what lies outside.
+// that are opaque everywhere in which the render is less than half opaque are excluded in the same way: they show what
+// lies outside.
 //
 // Throws Error if predicted exposures have no response, or if the split is empty, or a photo, mask, depth or the
 // weights cannot be read.

@@ -113,6 +113,21 @@ TEST(Evaluate, ComparesOnlyOpaquePixelsIfNothingIsShownOutside) {
   EXPECT_EQ(whole.compared, 1);
 }
 
+// As files of four channels often are.
+TEST(Evaluate, TakesPhotosThatAreOpaqueEverywhereForThoseWithoutAlpha) {
+  FakeCapture fake("evaluate_outside_opaque");
+  fake.add("a", ImageU8(64, 48, 4, 255));
+  RenderedView view = {ImageF(64, 48, 3, 0.5f), ImageF(64, 48, 1, 1.0f), ImageF(64, 48, 1, 2.0f)};
+  for (int y = 0; y < 48; ++y)
+    for (int x = 48; x < 64; ++x) view.opacity.at(x, y)[0] = 0;
+  FakeRenderer renderer([&](const Camera&, int) { return view; });
+  renderer.hasOutside = false;
+  EXPECT_EQ(evaluate(renderer, fake.capture, {}).compared, 0.75);
+  EvaluateOptions options;
+  options.rightHalves = true;
+  EXPECT_EQ(evaluate(renderer, fake.capture, options).compared, 0.5);
+}
+
 TEST(Evaluate, ComparesAllPixelsOfPhotosWithAlpha) {
   FakeCapture fake("evaluate_outside_alpha");
   ImageU8 photo(64, 48, 4, 255);

@@ -100,7 +100,7 @@ void keepFreedMemory() {
 
 std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
   std::shared_ptr<GpuContext> context(new GpuContext);
-  context->createInstance(options.validation || environment("TESSERA_VULKAN_VALIDATION") == "1", options.presents);
+  context->createInstance(options.validation || environment("TESSERA_VULKAN_VALIDATION") == "1");
   context->choosePhysicalDevice(options.device.empty() ? environment("TESSERA_GPU") : options.device);
   context->chooseQueueFamily();
   context->chooseFeatures(options.allowed);
@@ -115,7 +115,7 @@ std::shared_ptr<GpuContext> GpuContext::open(const GpuOptions& options) {
 
 std::vector<GpuDescription> GpuContext::devices() {
   GpuContext context;
-  context.createInstance(false, false);
+  context.createInstance(false);
   std::vector<GpuDescription> all;
   for (const PhysicalDevice& device : physicalDevices(context.instance_)) {
     GpuDescription description;
@@ -149,11 +149,13 @@ GpuContext::~GpuContext() {
   if (instance_) vkDestroyInstance(instance_, nullptr);
 }
 
-void GpuContext::createInstance(bool validation, bool presents) {
+// All instances have the same extensions: layers that sort devices, such as Mesa's, ask the screen only with these, and
+// an index must mean the same device everywhere.
+void GpuContext::createInstance(bool validation) {
   openLoader();
   validation = validation && validationInstalled();
   loadCalls();
-  instance_ = makeInstance(validation, presents ? surfaceExtensions() : std::vector<const char*>());
+  instance_ = makeInstance(validation, surfaceExtensions());
   if (validation) messenger_ = createValidationMessenger(instance_);
 }
 

@@ -128,7 +128,7 @@ class GpuContext {
 
  private:
   GpuContext() = default;
-  void createInstance(bool validation, bool presents);
+  void createInstance(bool validation);
   void choosePhysicalDevice(const std::string& requested);
   void chooseQueueFamily();
   void chooseFeatures(const GpuFeatures& allowed);

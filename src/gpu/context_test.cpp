@@ -59,6 +59,7 @@ TEST(PhysicalDevice, IsFoundByIndexEvenIfNamesContainNumbers) {
   const std::vector<PhysicalDevice> gpus = {device("H100", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU),
                                             device("H101", VK_PHYSICAL_DEVICE_TYPE_DISCRETE_GPU)};
   EXPECT_EQ(physicalDeviceName(choosePhysicalDevice(gpus, "1")), "H101");
+  EXPECT_EQ(physicalDeviceName(choosePhysicalDevice(gpus, "101")), "H101") << "no index";
   EXPECT_THROW(choosePhysicalDevice(gpus, "2"), Error);
 }
 

@@ -154,7 +154,7 @@ GpuHeap::Piece GpuHeap::allocateImage(VkImage image) {
 
 GpuHeap::Piece GpuHeap::take(Blocks& blocks, const Request& request, const MakeBlock& make) {
   const size_t capacity = request.capacity;
-  const bool shared = request.mayShare && capacity <= kBlockBytes / 2;
+  bool shared = request.mayShare && capacity <= kBlockBytes / 2;
   Block* chosen = nullptr;
   std::optional<size_t> offset;
   for (size_t i = 0; shared && i < blocks.size() && !offset; ++i) {
@@ -163,7 +163,13 @@ GpuHeap::Piece GpuHeap::take(Blocks& blocks, const Request& request, const MakeB
     offset = chosen->free.take(capacity);
   }
   if (!offset) {
-    blocks.push_back(make(shared ? kBlockBytes : capacity));
+    try {
+      blocks.push_back(make(shared ? kBlockBytes : capacity));
+    } catch (const Error&) {
+      if (!shared) throw;
+      shared = false;  // there may be memory for this piece alone
+      blocks.push_back(make(capacity));
+    }
     chosen = blocks.back().get();
     chosen->shared = shared;
     offset = chosen->free.take(capacity);

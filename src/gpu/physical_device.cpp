@@ -79,13 +79,13 @@ const PhysicalDevice& choosePhysicalDevice(const std::vector<PhysicalDevice>& de
       return worth(a) < worth(b);
     });
   }
-  const bool isIndex = requested.find_first_not_of("0123456789") == std::string::npos;
   std::string list;
   for (size_t i = 0; i < devices.size(); ++i) {
+    if (std::to_string(i) == requested) return devices[i];
+  }
+  for (size_t i = 0; i < devices.size(); ++i) {
     const std::string name = devices[i].properties.deviceName;
-    if (isIndex ? std::to_string(i) == requested : lowerCase(name).find(lowerCase(requested)) != std::string::npos) {
-      return devices[i];
-    }
+    if (lowerCase(name).find(lowerCase(requested)) != std::string::npos) return devices[i];
     list += fmt::format("{}{} {}", i ? ", " : "", i, name);
   }
   throw Error("Vulkan device \"" + requested + "\"", "", "there is no such device", "choose one of: " + list);

@@ -18,6 +18,7 @@ GpuSwapchain::GpuSwapchain(std::shared_ptr<const GpuContext> context, VkSurfaceK
       throw Error(context_->name(), "", "it cannot present images on this screen",
                   "choose the device that the screen is connected to (tessera info devices)");
     }
+    context_->requireGraphics();
     chooseFormat();
     makeRenderPass();
   } catch (...) {

@@ -27,6 +27,7 @@ PhotoFacts readPhotoFacts(const Photo& photo) {
   if (!info || info->format == ImageInfo::Format::exr) return facts;
   facts.width = info->width;
   facts.height = info->height;
+  facts.isPng = info->format == ImageInfo::Format::png;
   facts.tags = decodePhotoTags(head);
   return facts;
 }

@@ -14,6 +14,7 @@ namespace tessera {
 
 struct PhotoFacts {
   int width = 0, height = 0;  // 0: missing or unreadable
+  bool isPng = false;         // by its content
   PhotoTags tags;
 };
 

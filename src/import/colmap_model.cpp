@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <map>
 
 #include "base/error.h"
@@ -133,7 +134,7 @@ std::optional<Camera> colmapCamera(std::string_view model, uint64_t width, uint6
   return checkedCamera(*lens, width, height, parameters, reason);
 }
 
-SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder) {
+SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder, const fs::path& maskFolder) {
   SourceCapture source;
   Capture& capture = source.capture;
   std::unordered_map<uint32_t, int> cameraIndex;
@@ -154,7 +155,6 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
 
   size_t withoutCamera = 0, outside = 0, withoutPose = 0;
   std::map<std::string, size_t> unusable;  // number of photos by lens
-  const fs::path maskFolder = imageFolder.parent_path() / "masks";
   for (const ColmapModel::Image& image : model.images) {
     if (const auto lens = model.unusable.find(image.camera); lens != model.unusable.end()) {
       ++unusable[lens->second];
@@ -197,29 +197,58 @@ SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageF
   return source;
 }
 
-std::optional<fs::path> findColmapModel(const fs::path& source) {
-  for (const fs::path& folder : {source / "sparse", source / "colmap" / "sparse"}) {
-    // COLMAP numbers the components that it could not join. The one with the largest list of images is used.
-    fs::path best;
-    uintmax_t bestSize = 0;
-    int pieces = 0;
-    for (int i = 0; isModelFolder(folder / std::to_string(i)); ++i, ++pieces) {
-      const fs::path piece = folder / std::to_string(i);
-      std::error_code status;
-      uintmax_t size = fs::file_size(piece / "images.bin", status);
-      if (status) size = fs::file_size(piece / "images.txt", status);
-      if (!status && size > bestSize) {
-        bestSize = size;
-        best = piece;
-      }
+namespace {
+
+// Returns the number of photos of a model; 0 if it cannot be read.
+uint64_t countPhotos(const fs::path& model) {
+  std::error_code status;
+  try {
+    if (fs::is_regular_file(model / "images.bin", status)) {
+      uint64_t count = 0;
+      const Bytes head = readFileStart(model / "images.bin", sizeof count);
+      if (head.size() == sizeof count) std::memcpy(&count, head.data(), sizeof count);
+      return count;
     }
-    if (pieces > 1)
-      warn("{} holds {} separate models; the largest, {}, is taken", folder.string(), pieces, best.string());
-    if (!best.empty()) return best;
-    if (isModelFolder(folder)) return folder;
+    // Two lines for each photo, and comments.
+    const std::string text = readTextFile(model / "images.txt");
+    uint64_t lines = 0;
+    for (size_t begin = 0; begin < text.size(); begin = std::min(text.find('\n', begin), text.size() - 1) + 1)
+      lines += text[begin] == '#' ? 0 : 1;
+    return lines / 2;
+  } catch (const Error&) {
+    return 0;
   }
-  if (isModelFolder(source)) return source;
-  return std::nullopt;
+}
+
+struct FoundModel {
+  std::optional<fs::path> folder;
+  fs::path among;  // the folder of several models
+  int pieces = 0;  // that are there
+};
+
+FoundModel findModel(const fs::path& source) {
+  for (const fs::path& folder : {source / "sparse", source / "colmap" / "sparse"}) {
+    // COLMAP numbers the components that it could not join. The one with the most photos is used.
+    FoundModel found{.among = folder};
+    uint64_t most = 0;
+    for (; isModelFolder(folder / std::to_string(found.pieces)); ++found.pieces) {
+      const fs::path piece = folder / std::to_string(found.pieces);
+      const uint64_t photos = countPhotos(piece);
+      if (found.folder && photos <= most) continue;
+      most = photos;
+      found.folder = piece;
+    }
+    if (found.folder) return found;
+    if (isModelFolder(folder)) return {.folder = folder};
+  }
+  if (isModelFolder(source)) return {.folder = source};
+  return {};
+}
+
+}  // namespace
+
+std::optional<fs::path> findColmapModel(const fs::path& source) {
+  return findModel(source).folder;
 }
 
 ColmapModel readColmapModel(const fs::path& folder) {
@@ -241,9 +270,17 @@ ColmapModel readColmapModel(const fs::path& folder) {
   return *std::move(model);
 }
 
-SourceCapture readColmap(const fs::path& source) {
-  const fs::path folder = findColmapModel(source).value_or(source);
-  return captureFromColmap(readColmapModel(folder), findImages(source, folder));
+SourceCapture readColmap(const fs::path& given) {
+  const fs::path source = fs::weakly_canonical(given);  // its parents have names
+  const FoundModel found = findModel(source);
+  const fs::path folder = found.folder.value_or(source);
+  if (found.pieces > 1) {
+    warn("{} holds {} separate models; the one with the most photos, {}, is taken", found.among.string(), found.pieces,
+         folder.string());
+  }
+  const fs::path images = findImages(source, folder);
+  return captureFromColmap(readColmapModel(folder), images,
+                           (images == source ? source : images.parent_path()) / "masks");
 }
 
 }  // namespace tessera

@@ -58,15 +58,15 @@ bool isColmapLens(std::string_view model);       // whether colmapCamera support
 
 // Converts a model into a capture: poses, points, and tracks as observations, each with its own reprojection error.
 // Image paths become `imageFolder`/name. Drops photos whose camera is missing or unusable, whose pose is not finite or
-// implausibly far away, or whose name leaves the folder, with a warning.
-SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder);
+// implausibly far away, or whose name leaves the folder, with a warning. `maskFolder`: that of findMask; empty: none.
+SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder, const fs::path& maskFolder = {});
 
 // Returns the mask of the photo a/b.jpg in a folder of masks: a/b.jpg.png (COLMAP's convention), a/b.jpg or a/b.png;
 // an empty path if there is none.
 fs::path findMask(const fs::path& maskFolder, const std::string& name);
 
 // Returns the folder of the sparse model in a source folder (sparse/0, sparse, colmap/sparse/0, or the folder itself;
-// the largest of several numbered ones, with a warning), or nothing if it has none.
+// that with the most photos of several numbered ones), or nothing if it has none.
 std::optional<fs::path> findColmapModel(const fs::path& source);
 // Reads the files of a model in a folder. Throws Error naming the file or folder if they cannot be read or decoded.
 // Warns if there is no points3D file.

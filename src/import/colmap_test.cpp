@@ -244,6 +244,53 @@ TEST(Colmap, IsFoundInTheFoldersThatColmapUses) {
   }
 }
 
+void writeTextModel(const fs::path& folder, const std::string& images) {
+  writeFileAtomically(folder / "cameras.txt", std::string_view("1 PINHOLE 4 4 1 1 2 2\n"));
+  writeFileAtomically(folder / "images.txt", images);
+  writeFileAtomically(folder / "points3D.txt", std::string_view(""));
+}
+
+TEST(Colmap, IsFoundByAnyWayToItsFolder) {
+  const TemporaryFolder folder;
+  writeTextModel(folder / "sparse/0", "1 1 0 0 0 0 0 0 1 a.png\n\n");
+  fs::create_directories(folder / "images");
+  for (const char* way : {"sparse/0", "sparse/0/", "sparse/0/.", "images/../sparse/0/"}) {
+    const SourceCapture source = readColmap(folder / way);
+    ASSERT_EQ(source.capture.photos.size(), 1u) << way;
+    EXPECT_EQ(source.capture.photos[0].image, folder / "images/a.png") << way;
+  }
+}
+
+TEST(Colmap, HasMasksBesideItsImagesOrAmongThem) {
+  for (const std::string images : {"images/", ""}) {
+    const TemporaryFolder folder;
+    writeTextModel(folder / "flight/sparse/0", "1 1 0 0 0 0 0 0 1 a.png\n\n");
+    fs::create_directories(folder / "flight" / images);
+    writeFileAtomically(folder / "flight/masks/a.png", "a mask");
+    writeFileAtomically(folder / "masks/a.png", "that of something else");
+    for (const char* way : {"flight", "flight/"})
+      EXPECT_EQ(readColmap(folder / way).capture.photos.at(0).mask, folder / "flight/masks/a.png") << images << way;
+  }
+}
+
+// Of separate models, not the one with the largest file: photos differ in their numbers of features.
+TEST(Colmap, IsTheModelWithTheMostPhotos) {
+  const TemporaryFolder folder;
+  const std::string points(1000, ' ');
+  writeTextModel(folder / "sparse/0", "# a comment\n1 1 0 0 0 0 0 0 1 a.png\n" + points + "\n");
+  writeTextModel(folder / "sparse/1", "1 1 0 0 0 0 0 0 1 b.png\n\n2 1 0 0 0 0 0 0 1 c.png\n\n");
+  EXPECT_EQ(findColmapModel(folder.path()), folder / "sparse/1");
+  const auto binary = [&](const char* name, uint64_t photos, size_t bytes) {
+    std::string text(bytes, '\0');
+    std::memcpy(text.data(), &photos, sizeof photos);
+    writeFileAtomically(folder / name / "cameras.bin", "");
+    writeFileAtomically(folder / name / "images.bin", text);
+  };
+  binary("sparse/2", 40, 10000);
+  binary("sparse/3", 60, 500);
+  EXPECT_EQ(findColmapModel(folder.path()), folder / "sparse/3");
+}
+
 TEST(Colmap, NamesTheFolderOfADamagedModel) {
   const TemporaryFolder folder;
   writeFileAtomically(folder / "cameras.bin", std::string_view("\x01\0\0\0", 4));

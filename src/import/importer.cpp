@@ -186,7 +186,7 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
     const Size size = reduced(facts[i], options.downscale);
     std::string extension = photos[i].image.extension().string();
     if (options.downscale > 1) {
-      const bool lossless = int64_t{size.width} * size.height <= kLosslessPixels || extension == ".png";
+      const bool lossless = int64_t{size.width} * size.height <= kLosslessPixels || facts[i].isPng;
       extension = lossless ? ".png" : ".jpg";
     }
     const fs::path original = photos[i].name;
@@ -202,6 +202,11 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
     const std::string how = fmt::format("{} x {}", size.width, size.height);
     origins.add(photos[i].name, photos[i].image, how);
     const bool hasMask = !photos[i].mask.empty();
+    if (hasMask && !options.maskCommand.empty() &&
+        fs::weakly_canonical(photos[i].mask) == fs::weakly_canonical(out / mask)) {
+      throw Error(out.string(), "", "holds the masks of the source: those of --mask-command would take their place",
+                  "name another folder to write to");
+    }
     const std::string conversion = how + (hasMask && source.maskIsInverted[i] ? ", inverted" : "");
     if (!options.maskCommand.empty()) {
       const std::string other = hasMask ? ", and " + describeFile(photos[i].mask) : "";
@@ -213,6 +218,8 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
   }
   // While images change, the folder is not a complete capture.
   std::error_code status;
+  const bool isCapture = fs::exists(out / "transforms.json", status);
+  if (!isCapture) origins.requireOwn(out);
   fs::remove(out / "transforms.json", status);
   origins.claim(out);
   Outcomes outcomes{std::vector<FileOutcome>(photos.size(), FileOutcome::ready), {}, {}};
@@ -316,6 +323,10 @@ Capture importCapture(const fs::path& sourcePath, const fs::path& out, const Imp
   if (fs::weakly_canonical(sourcePath) == fs::weakly_canonical(out)) {
     throw Error(out.string(), "", "is the source itself", "name another folder to write to");
   }
+  for (const fs::path& file : findTransforms(sourcePath)) {
+    if (fs::equivalent(file, out / "transforms.json", status))
+      throw Error(out.string(), "", "holds the source, which would be replaced", "name another folder to write to");
+  }
   checkHoldOut(options.holdout);
   if (!options.maskCommand.empty()) MaskCommand{options.maskCommand};  // throws Error if it is malformed
   return importSource(readSourceCapture(sourcePath), sourcePath.string(), out, options);
@@ -325,6 +336,10 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
   std::error_code status;
   ThreadPool pool(options.threads);
   if (options.holdout == "auto" && source.splitError) throw *source.splitError;
+  if (holdsPosesOfOthers(out)) {
+    throw Error((out / "transforms.json").string(), "", "was not written by an import, and would be lost",
+                "name another folder to write to");
+  }
   std::set<std::string> dropped;
   for (const Photo& photo : source.capture.photos) dropped.insert(photo.name);
   const std::vector<PhotoFacts> facts = cleanSource(source, pool);

@@ -76,13 +76,16 @@ bool isReady(const fs::path& source, const fs::path& target, int width, int heig
 }
 
 FileOutcome importPhoto(const fs::path& source, const fs::path& target, int width, int height) {
-  if (isReady(source, target, width, height)) return FileOutcome::ready;
+  std::error_code status;
+  // Imported in place, it has not been decoded before.
+  const bool isInPlace = fs::weakly_canonical(source, status) == fs::weakly_canonical(target, status);
+  if (!isInPlace && isReady(source, target, width, height)) return FileOutcome::ready;
   const auto decoded = decodeImage(readFile(source));
   if (!decoded) return FileOutcome::unreadable;
   if (decoded->truncated) return FileOutcome::truncated;
   const ImageU8& image = decoded->image;
   if (image.width == width && image.height == height) {
-    linkOrCopy(source, target);
+    if (!isInPlace) linkOrCopy(source, target);
     return FileOutcome::ready;
   }
   if (image.width < width || image.height < height) return FileOutcome::unreadable;  // contradicts the header

@@ -44,6 +44,17 @@ void PictureOrigins::add(const std::string& picture, const fs::path& source, con
   origins_[picture] = {source, hashText(describeFile(source) + "\n" + how)};
 }
 
+void PictureOrigins::requireOwn(const fs::path& capture) const {
+  std::error_code status;
+  if (fs::exists(capture / "sources.txt", status)) return;
+  for (const auto& [picture, origin] : origins_) {
+    const fs::path path = capture / picture;
+    if (!fs::is_regular_file(path, status) || fs::equivalent(path, origin.source, status)) continue;
+    throw Error(path.string(), "", "was not written by an import, and would be lost",
+                "name another folder to write to");
+  }
+}
+
 void PictureOrigins::claim(const fs::path& capture) const {
   const fs::path file = capture / "sources.txt";
   const auto known = readFingerprints(file);

@@ -21,6 +21,10 @@ class PictureOrigins {
   // Adds an image. `picture` is its path in the capture; `how` describes everything else that its pixels depend on.
   void add(const std::string& picture, const fs::path& source, const std::string& how);
 
+  // Throws Error if `capture`, which has no record of sources, holds a file in the place of an added image that is not
+  // its source: a user's own, which `claim` would remove.
+  void requireOwn(const fs::path& capture) const;
+
   // Removes those of the added images from `capture` that were produced from another source or conversion, then writes
   // sources.txt: every added image that exists afterwards can be reused. Throws Error if an image cannot be removed.
   void claim(const fs::path& capture) const;

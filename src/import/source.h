@@ -11,10 +11,10 @@
 namespace tessera {
 
 struct SourceCapture {
-  Capture capture;                  // camera axes as in scene/axes.h, in the source's own world
-  bool hasOwnSplit = false;         // Photo::split comes from the source
-  bool knowsUp = false;             // the source's Z is up (NeRF files); the axes of COLMAP's world are arbitrary
-  bool isOurs = false;              // written by writeCapture: its world is final
+  Capture capture;           // camera axes as in scene/axes.h, in the source's own world
+  bool hasOwnSplit = false;  // Photo::split comes from the source
+  bool knowsUp = false;      // the source's Z is up (NeRF files, but not those that nerfstudio makes of COLMAP's)
+  bool isOurs = false;       // written by writeCapture: its world is final
   std::optional<Error> splitError;  // why Photo::split must not be used: the source's lists match none of its photos
   // By photo: whether its mask has the opposite meaning (instant-ngp's dynamic_mask: white = do not train on).
   std::vector<bool> maskIsInverted;

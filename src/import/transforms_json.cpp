@@ -252,12 +252,15 @@ bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& fil
   const size_t index = file.frames.size();
   TransformsFrame frame;
   if (object.is_object()) frame.file = textOr(object, "file_path");
-  const auto matrix = object.is_object() ? readMatrix(object, "transform_matrix") : std::nullopt;
+  auto matrix = object.is_object() ? readMatrix(object, "transform_matrix") : std::nullopt;
+  // Of photos with a rolling shutter, instant-ngp has the pose at the start.
+  if (!matrix && object.is_object()) matrix = readMatrix(object, "transform_matrix_start");
   if (frame.file.empty() || !matrix) {
     reason = fmt::format("frames[{}]: has no {}", index, frame.file.empty() ? "file_path" : "4 x 4 transform_matrix");
     return false;
   }
   noteKeys(object, file);
+  file.isOfColmap |= object.contains("colmap_im_id");
   frame.worldFromCameraGl = *matrix;
   frame.mask = textOr(object, "mask_path");
   frame.depth = textOr(object, "depth_file_path");

@@ -51,6 +51,7 @@ struct TransformsFile {
   Mat4d appliedTransform = Mat4d::Identity();  // invertible; its last row is 0 0 0 1
   double appliedScale = 1;
   std::string appliedTrouble;                    // why one of the two was ignored; empty if none was
+  bool isOfColmap = false;                       // nerfstudio's converter wrote it: Z is an axis of COLMAP's world
   double integerDepthScale = 0;                  // instant-ngp: world units per step, 0: not given
   std::set<std::string> unknownKeys;             // of the file and its frames
   std::map<std::string, std::string> unmetKeys;  // known but unsupported keys → the consequence
@@ -67,6 +68,9 @@ std::optional<TransformsFile> decodeTransforms(std::string_view text, std::strin
 
 // Reads and decodes a file. Throws Error naming it if it cannot be read or decoded.
 TransformsFile loadTransforms(const fs::path& file);
+
+// Whether a folder has a transforms.json that is not one of our captures.
+bool holdsPosesOfOthers(const fs::path& folder);
 
 // Returns the camera for a photo of that size (which is used where the file gives none), or nothing, with the reason in
 // `reason`, for an unsupported lens or a lens without a focal length.

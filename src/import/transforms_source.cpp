@@ -264,13 +264,23 @@ TransformsFile loadTransforms(const fs::path& file) {
   return std::move(*transforms);
 }
 
+bool holdsPosesOfOthers(const fs::path& folder) {
+  const fs::path file = folder / "transforms.json";
+  if (!isFile(file)) return false;
+  std::string reason;
+  const auto transforms = decodeTransforms(readTextFile(file), reason);
+  return transforms && !transforms->isOurs;
+}
+
 SourceCapture readTransforms(const std::vector<fs::path>& files) {
   SourceCapture source;
   source.knowsUp = true;
   Capture& capture = source.capture;
-  for (const fs::path& file : files) {
-    const TransformsFile transforms = loadTransforms(file);
-    reportKeys(file, transforms);
+  for (const fs::path& given : files) {
+    const fs::path file = fs::absolute(given);  // its folder has a name
+    const TransformsFile transforms = loadTransforms(given);
+    reportKeys(given, transforms);
+    source.knowsUp &= !transforms.isOfColmap;
     if (transforms.isOurs) {
       source.isOurs = true;
       capture.cameras = transforms.cameras;
@@ -297,7 +307,7 @@ SourceCapture readTransforms(const std::vector<fs::path>& files) {
       photoOfFrame.push_back(isAdded ? static_cast<int>(capture.photos.size()) - 1 : -1);
       if (isAdded) capture.photos.back().split = splits[i].value_or(Split::train);
     }
-    reportDropped(file, dropped);
+    reportDropped(given, dropped);
     readObservations(file, transforms, photoOfFrame, capture);
   }
   return source;

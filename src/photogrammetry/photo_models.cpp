@@ -254,7 +254,7 @@ std::vector<int> PhotoModels::placedApart() const {
 
 SourceCapture PhotoModels::readFrom(const fs::path& model) const {
   // The links in `images` lead out of that folder, which would be refused: photos get their own paths below.
-  SourceCapture source = captureFromColmap(readColmapModel(model), folder_ / "named");
+  SourceCapture source = captureFromColmap(readColmapModel(model), folder_ / "named", folder_ / "masks");
   source.flight.assign(source.capture.photos.size(), 0);
   std::map<std::string, const ListedPhoto*> bySafeName;
   for (const ListedPhoto& photo : list_.photos) bySafeName[photo.safeName] = &photo;

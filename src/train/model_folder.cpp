@@ -48,11 +48,13 @@ std::optional<ModelManifest> ModelFolder::manifest() const {
     manifest.plannedSteps = parsed.at("planned_steps").get<int64_t>();
     manifest.seconds = parsed.value("seconds", 0.0);
     manifest.savingSeconds = parsed.value("saving_seconds", 0.0);
+    manifest.minutes = parsed.value("minutes", 0.0);
     for (const json& file : parsed.at("files")) manifest.files.push_back(file.get<std::string>());
   } catch (const json::exception& error) {
     throw Error(path.string(), "", error.what(), "restore the file or train again");
   }
-  const bool areTimes = manifest.savingSeconds >= 0 && manifest.seconds >= manifest.savingSeconds;
+  const bool areTimes =
+      manifest.savingSeconds >= 0 && manifest.seconds >= manifest.savingSeconds && manifest.minutes >= 0;
   if (manifest.files.empty() || manifest.step < 0 || manifest.plannedSteps < 0 || !areTimes) {
     throw Error(path.string(), "", "names no checkpoint, or a step or a time below zero",
                 "restore the file or train again");
@@ -100,6 +102,7 @@ void ModelFolder::writeManifest(const ModelManifest& manifest) const {
   if (manifest.plannedSteps == 0 && manifest.seconds > 0) {
     text["seconds"] = manifest.seconds;
     text["saving_seconds"] = manifest.savingSeconds;
+    text["minutes"] = manifest.minutes;
   }
   writeFileAtomically(root_ / "manifest.json", text.dump(2) + "\n", true);
 }
@@ -168,6 +171,7 @@ ModelPlacement ModelFolder::readPlacement() const {
     placement.sourceFromWorld = sourceFromWorldIn(parsed);
     placement.capture = parsed.at("capture").get<std::string>();
     placement.trainedOn = parsed.at("trained_on").get<std::vector<std::string>>();
+    placement.method = parsed.value("method", "");
     return placement;
   } catch (const json::exception& error) {
     throw Error(path.string(), "", error.what(), "restore the file or train again");

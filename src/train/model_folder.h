@@ -22,6 +22,7 @@ struct ModelManifest {
   // Of the steps done, while it is not yet known how many are planned; of these seconds, those that went into
   // checkpoints.
   double seconds = 0, savingSeconds = 0;
+  double minutes = 0;  // while the number of steps is not yet known: those of `--minutes`; 0: unknown
 };
 
 // The number of steps that was derived from `--minutes`. The steps before `plannedAtStep` were done without knowing it,
@@ -38,6 +39,7 @@ struct ModelPlacement {
   Mat4d sourceFromWorld = Mat4d::Identity();  // of the capture: camera paths refer to the world of its source
   fs::path capture;
   std::vector<std::string> trainedOn;  // names of photos, in the capture's order
+  std::string method = {};             // as it is read; empty: it is not stated
 };
 
 class ModelFolder {

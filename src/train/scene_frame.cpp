@@ -68,11 +68,12 @@ SceneFrame frameOfCameras(const Capture& capture) {
   }
   SceneFrame frame;
   if (!photos.empty()) frame.centre = sum.ldlt().solve(right);
-  double reach = 1e-9;
+  double reach = 0;
   for (const Photo* photo : photos) {
     reach = std::max(reach, (photo->worldFromCamera.translation - frame.centre).lpNorm<Eigen::Infinity>());
   }
-  frame.scale = 1 / reach;
+  constexpr double kAtOnePlace = 1e-9;  // then nothing tells the scale
+  frame.scale = 1 / (reach > kAtOnePlace ? reach : 1);
   return frame;
 }
 

@@ -90,10 +90,12 @@ Start startingPoint(TrainableModel& trainable, const ModelFolder& folder, const 
     return {state, 0};
   }
   const StepPlan plan = options.resume ? folder.readPlan().value_or(StepPlan()) : StepPlan();
+  if (options.minutes > 0) state.minutes = options.minutes;
   if (options.minutes > 0 || plan.steps > 0) {
     state.plannedSteps = plan.steps;
     return {state, plan.plannedAtStep};
   }
+  if (state.plannedSteps == 0 && state.minutes > 0) return {state, 0};  // interrupted before it was known
   if (state.plannedSteps == 0) state.plannedSteps = kDefaultSteps;
   return {state, 0};
 }
@@ -131,10 +133,11 @@ void warnOfOtherDevice(const fs::path& path, const Safetensors& state, const std
 TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder, const TrainingLoopOptions& options) {
   using Clock = std::chrono::steady_clock;
   auto [state, planMadeAt] = startingPoint(trainable, folder, options);
-  if (!options.resume) fs::remove(folder.root() / "plan.json");
+  const bool hasSteps = options.steps > 0 && options.minutes <= 0;
+  if (!options.resume || hasSteps) fs::remove(folder.root() / "plan.json");
   const auto start = Clock::now();
   const auto seconds = [&] { return std::chrono::duration<double>(Clock::now() - start).count(); };
-  StepBudget budget(options.minutes);
+  StepBudget budget(state.minutes);
   Window window;
   TrainingResult result;
   double savedAt = 0, lastSaving = 0, saving = 0;  // seconds
@@ -176,7 +179,9 @@ TrainingResult runTraining(TrainableModel& trainable, const ModelFolder& folder,
     ++state.step;
     const double now = seconds();
     if (state.plannedSteps == 0) {
-      const double savingShare = lastSaving > 0 ? lastSaving / (lastSaving + untilSaving()) : 0;
+      // A step at least lies between two checkpoints.
+      const double perStep = (secondsBefore + now - savingBefore - saving) / static_cast<double>(state.step);
+      const double savingShare = lastSaving > 0 ? lastSaving / (lastSaving + std::max(untilSaving(), perStep)) : 0;
       state.plannedSteps = budget.observe(state.step, secondsBefore + now, savingBefore + saving, savingShare);
       if (state.plannedSteps != 0) {
         planMadeAt = state.step;

@@ -342,6 +342,42 @@ TEST_F(TrainingLoop, CountsTheMinutesOfInterruptedAttempts) {
   EXPECT_EQ(folder_.readPlan()->steps, result.step);
 }
 
+TEST_F(TrainingLoop, RemembersItsMinutesBeforeTheStepsAreKnown) {
+  FakeTrainableModel first, second;
+  first.pace = second.pace = std::chrono::microseconds(200);
+  TrainingLoopOptions some = options(0);
+  some.minutes = 0.4 / 60;
+  some.stopRequested = [&] { return first.steps.size() >= 20; };
+  EXPECT_EQ(runTraining(first, folder_, some).plannedSteps, 0);
+  const TrainingResult result = runTraining(second, folder_, options(0, true));
+  EXPECT_TRUE(result.finished);
+  EXPECT_NE(result.plannedSteps, kDefaultSteps);
+  EXPECT_LT(result.seconds, 4);
+  EXPECT_EQ(folder_.readPlan()->steps, result.plannedSteps);
+}
+
+TEST_F(TrainingLoop, TakesStepsInsteadOfAnEarlierPlan) {
+  FakeTrainableModel first, second;
+  fs::create_directories(folder_.root());
+  folder_.writePlan({7, 3});
+  TrainingLoopOptions some = options(20, true);
+  some.stopRequested = [&] { return first.steps.size() >= 10; };
+  EXPECT_EQ(runTraining(first, folder_, some).plannedSteps, 20);
+  EXPECT_EQ(runTraining(second, folder_, options(0, true)).plannedSteps, 20);
+}
+
+// A checkpoint after each step takes as long as the step.
+TEST_F(TrainingLoop, CountsCheckpointsOfEachStep) {
+  FakeTrainableModel trainable;
+  trainable.pace = std::chrono::microseconds(2000);
+  TrainingLoopOptions some = options(0);
+  some.minutes = 1.0 / 60;
+  some.checkpointSeconds = 0;
+  const TrainingResult result = runTraining(trainable, folder_, some);
+  EXPECT_TRUE(result.finished);
+  EXPECT_GT(result.seconds, 0.6) << "of 1 s";
+}
+
 TEST_F(TrainingLoop, UsesThePlanOfARunThatWasKilledBeforeItsFirstCheckpoint) {
   FakeTrainableModel first;
   first.pace = std::chrono::microseconds(200);

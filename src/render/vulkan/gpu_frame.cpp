@@ -34,7 +34,7 @@ void GpuFrame::ensureCapacity(GpuBuffer& buffer, size_t floats) {
 void GpuFrame::ensureCapacity(const Camera& camera, uint32_t numbersOfPixel) {
   pixels_.update(camera, pool_);
   const size_t pixels = static_cast<size_t>(camera.width) * camera.height;
-  constexpr size_t kMax = std::numeric_limits<uint32_t>::max();  // kernels use 32-bit indices
+  constexpr size_t kMax = std::numeric_limits<int32_t>::max();  // drivers take indices as signed
   if (pixels * std::max<size_t>(numbersOfPixel, kNumbersDrawn) > kMax) {
     throw Error(fmt::format("image of {}x{}", camera.width, camera.height), "", "is too large for a GPU",
                 "ask for a smaller one, or use --device cpu");

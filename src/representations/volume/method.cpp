@@ -22,8 +22,9 @@ BlockDemand blockDemand(const MethodSettings& settings, const BlockRunOptions& o
 std::unique_ptr<OpenedModel> openModel(Device& device, const fs::path& folder) {
   auto model = loadVolumeModel(device, folder);
   const ModelManifest manifest = requireManifest(ModelFolder(folder));
+  // As in training, an unknown number of steps counts as the beginning.
   const double progress =
-      static_cast<double>(manifest.step) / static_cast<double>(std::max<int64_t>(1, manifest.plannedSteps));
+      manifest.plannedSteps == 0 ? 0 : static_cast<double>(manifest.step) / static_cast<double>(manifest.plannedSteps);
   auto renderer = std::make_unique<VolumeModelRenderer>(*model, cullThreshold(model->config(), progress));
   return std::make_unique<ModelWithRenderer<VolumeModel, VolumeModelRenderer>>(std::move(model), std::move(renderer));
 }
