@@ -220,25 +220,25 @@ uint64_t countPhotos(const fs::path& model) {
   }
 }
 
-struct FoundModel {
+struct ChosenModel {
   std::optional<fs::path> folder;
   fs::path among;  // the folder of several models
   int pieces = 0;  // that are there
 };
 
-FoundModel findModel(const fs::path& source) {
+ChosenModel findModel(const fs::path& source) {
   for (const fs::path& folder : {source / "sparse", source / "colmap" / "sparse"}) {
     // COLMAP numbers the components that it could not join. The one with the most photos is used.
-    FoundModel found{.among = folder};
-    uint64_t most = 0;
-    for (; isModelFolder(folder / std::to_string(found.pieces)); ++found.pieces) {
-      const fs::path piece = folder / std::to_string(found.pieces);
+    ChosenModel chosen{.among = folder};
+    uint64_t largest = 0;
+    for (; isModelFolder(folder / std::to_string(chosen.pieces)); ++chosen.pieces) {
+      const fs::path piece = folder / std::to_string(chosen.pieces);
       const uint64_t photos = countPhotos(piece);
-      if (found.folder && photos <= most) continue;
-      most = photos;
-      found.folder = piece;
+      if (chosen.folder && photos <= largest) continue;
+      largest = photos;
+      chosen.folder = piece;
     }
-    if (found.folder) return found;
+    if (chosen.folder) return chosen;
     if (isModelFolder(folder)) return {.folder = folder};
   }
   if (isModelFolder(source)) return {.folder = source};
@@ -272,11 +272,11 @@ ColmapModel readColmapModel(const fs::path& folder) {
 
 SourceCapture readColmap(const fs::path& given) {
   const fs::path source = fs::weakly_canonical(given);  // its parents have names
-  const FoundModel found = findModel(source);
-  const fs::path folder = found.folder.value_or(source);
-  if (found.pieces > 1) {
-    warn("{} holds {} separate models; the one with the most photos, {}, is taken", found.among.string(), found.pieces,
-         folder.string());
+  const ChosenModel chosen = findModel(source);
+  const fs::path folder = chosen.folder.value_or(source);
+  if (chosen.pieces > 1) {
+    warn("{} holds {} separate models; the one with the most photos, {}, is taken", chosen.among.string(),
+         chosen.pieces, folder.string());
   }
   const fs::path images = findImages(source, folder);
   return captureFromColmap(readColmapModel(folder), images,
