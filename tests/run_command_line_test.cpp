@@ -65,10 +65,12 @@ TEST_F(RunCommandLine, NamesWhatToInstallAndWhichStagesThereAre) {
   const std::string path = std::getenv("PATH");
   ::setenv("PATH", "/nowhere", 1);
   said = run({});
+  const Said inspected = run({"--until", "inspect"});
   ::setenv("PATH", path.c_str(), 1);
   EXPECT_EQ(said.exitCode, 1);
-  EXPECT_TRUE(contains(said.out, "3 photos, 0 with GPS, 0 left out; 1 cameras, 1 flights")) << said.out;
   EXPECT_TRUE(contains(said.err, "apt-get install colmap")) << said.err;
+  EXPECT_EQ(inspected.exitCode, 0);
+  EXPECT_TRUE(contains(inspected.out, "3 photos, 0 with GPS, 0 left out; 1 cameras, 1 flights")) << inspected.out;
 }
 
 TEST_F(RunCommandLine, KeepsTheFlagsOfTheRunBefore) {
