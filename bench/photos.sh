@@ -92,7 +92,7 @@ served() {
   wait "$run"
   trap - EXIT
   planned served
-  echo "brighton_beach, held-out PSNR: $(jq .psnr "$work/served/eval.json") dB"
+  echo "brighton_beach, held-out PSNR: $(jq -r '"\(.psnr) dB, exposures \(.exposure)"' "$work/served/eval.json")"
 }
 
 # scene_of CAPTURE METHOD SEED VIEWS: trains, bakes, and compares the scene with the held-out photographs of the capture VIEWS;
