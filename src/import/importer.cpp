@@ -348,6 +348,8 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
     throw Error(from, "", "no photo of it can be used", "see the warnings above");
   }
 
+  requireUtf8Names(capture.photos);
+
   std::vector<UprightTags> tags;
   for (size_t i = 0; i < facts.size(); ++i) {
     int& orientation = capture.photos[i].orientation;

@@ -93,5 +93,24 @@ TEST_F(Import, TakesThePoseAtTheStartOfARollingShutter) {
   EXPECT_TRUE(logged("exposed at one instant")) << log_;
 }
 
+TEST_F(Import, NamesAPhotoWhoseNameIsNotUtf8BeforeItImportsAny) {
+  writePng(source_ /
+               "images/S\xfc"
+               "d.png",
+           gradientPicture(16, 12));
+  const fs::path model = source_ / "sparse/0";
+  writeFileAtomically(model / "images.txt",
+                      "1 1 0 0 0 0 0 0 1 S\xfc"
+                      "d.png\n\n");
+  writeFileAtomically(model / "cameras.txt", "1 PINHOLE 16 12 9 9 8 6\n");
+  try {
+    run();
+    FAIL() << "no error";
+  } catch (const Error& error) {
+    EXPECT_NE(error.subject().find("d.png"), std::string::npos) << error.what();
+  }
+  EXPECT_FALSE(fs::exists(out_));
+}
+
 }  // namespace
 }  // namespace tessera

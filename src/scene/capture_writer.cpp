@@ -187,13 +187,20 @@ void writeCapture(const Capture& capture) {
     writeFileAtomically(capture.root / "observations.safetensors", encodeObservations(capture.observations), true);
   }
   json["frames"] = std::move(frames);
-  std::string text;
-  try {
-    text = json.dump(1) + "\n";
-  } catch (const Json::type_error&) {
-    throw Error((capture.root / "transforms.json").string(), "", "a photo's name is not UTF-8", "rename it");
+  requireUtf8Names(capture.photos);
+  writeFileAtomically(capture.root / "transforms.json", json.dump(1) + "\n", true);
+}
+
+void requireUtf8Names(const std::vector<Photo>& photos) {
+  for (const Photo& photo : photos) {
+    const Json name = photo.name;
+    try {
+      name.dump();
+    } catch (const Json::type_error&) {
+      throw Error(name.dump(-1, ' ', false, Json::error_handler_t::replace), "", "the photo's name is not UTF-8",
+                  "rename it");
+    }
   }
-  writeFileAtomically(capture.root / "transforms.json", text, true);
 }
 
 }  // namespace tessera

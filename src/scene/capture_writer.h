@@ -7,8 +7,8 @@
 // axes), mask_path, depth_file_path}, train_filenames, val_filenames, test_filenames, ply_file_path. There is no
 // applied_transform.
 // Our own keys: "tessera" at the top level {version, cameras[] {model, width, height, parameters}, source_from_world,
-// geo, observations} and in each frame {camera, name, exposure, depth_unit, gps}. Where both state a value, our own key
-// takes precedence.
+// geo, observations} and in each frame {camera, name, exposure, orientation, depth_unit, gps}. Where both state a
+// value, our own key takes precedence.
 //
 // observations.safetensors: photo u32[n] (index into frames), point u32[n] (index into points.ply), pixel f32[n, 2],
 // error f32[n].
@@ -21,5 +21,9 @@ namespace tessera {
 // Writes every file atomically, transforms.json last: a folder that contains it is complete. Throws Error if an image
 // lies outside `capture.root` or a file cannot be written.
 void writeCapture(const Capture& capture);
+
+// Throws Error naming the first photo whose name is not UTF-8, which writeCapture refuses, too: for callers that do
+// much before they write.
+void requireUtf8Names(const std::vector<Photo>& photos);
 
 }  // namespace tessera

@@ -297,9 +297,9 @@ TEST(MeshModel, EmptiesTheCellsThatNoRayReaches) {
 TEST(MeshModel, BeginsRaysAtADistanceInHalvesOfABlock) {
   const auto device = makeDevice({"cpu", 1});
   MeshConfig config = smallMeshConfig();
-  config.near = 2;
+  config.near = 1;
   MeshPart part{"block_0_0", 0, {}, {1, 1, 1}};
-  part.halfBlockEdge = 0.25f;  // as of the background block of four blocks in a row
+  part.halfBlockEdge = 0.5f;  // as of the background block of two blocks in a row
   MeshModel model(*device, config, part);
   RayDown ray(*device, 0.9f);
   ASSERT_GT(ray.trace(model.level(0)), 5u);

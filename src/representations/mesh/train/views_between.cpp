@@ -173,8 +173,8 @@ Capture addViewsBetween(Capture capture, const fs::path& mesh, uint64_t seed) {
   if (!count.is_number_unsigned()) throw folder.malformed("is not a number");
   if (count.get<uint64_t>() > most) {
     throw Error(capture.root.string(), "transforms.json",
-                fmt::format("has too few training photos for the {} views between photos of {}", count.get<uint64_t>(),
-                            mesh.string()),
+                fmt::format("has too few training photos for the {} views between photos that {} lists",
+                            count.get<uint64_t>(), folder.file("views.json").string()),
                 "use the capture that the model was trained on");
   }
   capture = placeViewsBetween(std::move(capture), count.get<size_t>(), seed);
