@@ -133,7 +133,8 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
   constexpr double kMapping = 0.187, kMappingGrowth = 1.274, kAdjusting = 0.0243, kAdjustingGrowth = 1.316;
   constexpr double kMargin = 1.4;        // of inliers and features, for memory, before they are known
   constexpr double kOfNeighbours = 0.6;  // inliers of all pairs, relative to those of neighbours
-  constexpr double kSecondsPerWordFeature = 0.3e-3, kPhotosForWords = 60, kLookAlikeSeconds = 0.3;
+  constexpr double kSecondsPerWordFeature = 0.35e-3, kPhotosForWords = 60;
+  constexpr double kLookAlikeSeconds = 0.15, kSecondsPerTwoPhotos = 0.0026;  // 50 and 202 photos were measured
   constexpr int64_t kBytesPerFeature = 155, kBytesPerInlier = 16, kModelBytesPerInlier = 31, kModels = 4;
   constexpr int64_t kMapperBytesPerInlier = 560, kMapperBytesPerFeature = 115;
   const double speed = relativeSeconds(rates);
@@ -150,10 +151,10 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
   needs.features = {photos * rates.secondsPerPhoto / parallel, 32 * kMiB + extractionBytes(extracting, size.pixels),
                     bytes(kBytesPerFeature, features)};
   const double featuresPerPhoto = photos > 0 ? features / photos : 0;
-  needs.lookAlikes = {
-      (kSecondsPerWordFeature * std::min(kPhotosForWords, photos) * featuresPerPhoto + kLookAlikeSeconds * photos) *
-          speed,
-      64 * kMiB + bytes(kBytesPerFeature, features), bytes(0.03 * kBytesPerFeature, features)};
+  needs.lookAlikes = {(kSecondsPerWordFeature * std::min(kPhotosForWords, photos) * featuresPerPhoto +
+                       kLookAlikeSeconds * photos + kSecondsPerTwoPhotos * photos * photos) *
+                          speed,
+                      64 * kMiB + bytes(kBytesPerFeature, features), bytes(0.03 * kBytesPerFeature, features)};
   // The photos that were tried may have had fewer features than most. Time grows about as their number does.
   const double tried = rates.featuresPerPhoto < 1 ? 1 : featuresPerPhoto / rates.featuresPerPhoto;
   needs.matches = {pairs * rates.secondsPerPair * tried, 64 * kMiB + bytes(3000, featuresPerPhoto),
