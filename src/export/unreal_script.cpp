@@ -7,7 +7,8 @@ namespace tessera {
 const char* const kUnrealScript =
     R"py("""Imports the scene of tessera that lies beside this file into the open project of Unreal Engine 5 and places it in the
 open level. In the editor: Tools, Execute Python Script. The plugins "Python Editor Script Plugin" and "Editor Scripting
-Utilities" must be on. Assets go to /Game/Tessera/NAME, or NAME_level_N of a coarser level; set TESSERA_FOLDER to change that. See docs/unreal.md of tessera."""
+Utilities" must be on. Assets go to /Game/Tessera/NAME, or NAME_level_N of a coarser level; set
+TESSERA_FOLDER to change that. See docs/unreal.md of tessera."""
 import json
 import os
 import re

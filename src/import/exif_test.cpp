@@ -200,14 +200,17 @@ TEST(Exif, RejectsImplausibleFixes) {
   EXPECT_FALSE(decodePhotoTags(encodeJpeg(gradientPicture(8, 8), 90, beyond.exif())).gps.has_value());
 }
 
+// Returns the fix of a photo with these tags in EXIF and these attributes in XMP.
+std::optional<GpsFix> readFix(const ExifBuilder& exif, const std::string& xmp) {
+  Bytes jpeg = encodeJpeg(gradientPicture(8, 8), 90, exif.exif());
+  const std::string packet = "<x:xmpmeta " + xmp + "></x:xmpmeta>";
+  const auto* begin = reinterpret_cast<const std::byte*>(packet.data());
+  jpeg.insert(jpeg.end(), begin, begin + packet.size());
+  return decodePhotoTags(jpeg).gps;
+}
+
 TEST(Exif, PrefersThePositionOfXmpUnlessItMakesNoSense) {
-  const auto read = [](const std::string& xmp) {
-    Bytes jpeg = encodeJpeg(gradientPicture(8, 8), 90, southWest().exif());
-    const std::string packet = "<x:xmpmeta " + xmp + "></x:xmpmeta>";
-    const auto* begin = reinterpret_cast<const std::byte*>(packet.data());
-    jpeg.insert(jpeg.end(), begin, begin + packet.size());
-    return decodePhotoTags(jpeg).gps;
-  };
+  const auto read = [](const std::string& xmp) { return readFix(southWest(), xmp); };
   const auto precise = read("a:GpsLatitude=\"-50.51000123\" a:GpsLongitude=\"-0.25000123\"");
   ASSERT_TRUE(precise.has_value());
   EXPECT_EQ(precise->latitude, -50.51000123);
@@ -232,11 +235,7 @@ TEST(Exif, PrefersThePositionOfXmpToWholeSeconds) {
       .rationals(2, {50, 1, 30, 1, 36, 1})
       .entry(3, 2, 2, {'E', 0})
       .rationals(4, {8, 1, 15, 1, 0, 1});
-  Bytes jpeg = encodeJpeg(gradientPicture(8, 8), 90, coarse.exif());
-  const std::string packet = "<x:xmpmeta a:GpsLatitude=\"50.5102\" a:GpsLongitude=\"8.2501\"></x:xmpmeta>";
-  const auto* begin = reinterpret_cast<const std::byte*>(packet.data());
-  jpeg.insert(jpeg.end(), begin, begin + packet.size());
-  const auto fix = decodePhotoTags(jpeg).gps;
+  const auto fix = readFix(coarse, "a:GpsLatitude=\"50.5102\" a:GpsLongitude=\"8.2501\"");
   ASSERT_TRUE(fix.has_value());
   EXPECT_EQ(fix->latitude, 50.5102);
 }

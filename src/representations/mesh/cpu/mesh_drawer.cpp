@@ -71,8 +71,8 @@ class MeshSceneShading final : public HitShading {
 
 class MeshDrawer final : public CpuDrawer {
  public:
-  // A patch has at least 96 bytes when decoded, and two triangles. With the copies of their corners, Embree takes up
-  // to 230 bytes for them (mesh_drawer_test.cpp).
+  // A patch has at least 96 bytes when decoded, and two triangles. With the copies of their corners, Embree takes at
+  // most three times as much for them (mesh_drawer_test.cpp).
   uint64_t residentBytes(uint64_t decodedBytes) const override { return 4 * decodedBytes + (1 << 20); }
   double hysteresis() const override { return kMeshHysteresis; }
   // While a content is prepared, its encoder is also in memory in float32.
