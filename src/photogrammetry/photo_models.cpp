@@ -3,38 +3,23 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
 #include <map>
 
 #include "base/error.h"
 #include "base/log.h"
 #include "import/colmap_model.h"
 #include "import/georeference.h"
+#include "photogrammetry/colmap_writer.h"
+#include "photogrammetry/outlying_observations.h"
 
 namespace tessera {
 namespace {
 
 constexpr size_t kPhotosForFullLens = 40;   // of a camera, from which on its principal point is adjusted
 constexpr double kFarthestCentre = 0.05;    // of the size of the picture, of a principal point from the middle
-constexpr const char* kAdjustments = "12";  // iterations: eight brought the change of the cost below one in a million
-
-// Returns cameras.bin with these cameras.
-Bytes encodeCameras(const std::map<uint32_t, Camera>& cameras) {
-  Bytes bytes;
-  const auto append = [&bytes](auto value) {
-    const auto* begin = reinterpret_cast<const std::byte*>(&value);
-    bytes.insert(bytes.end(), begin, begin + sizeof value);
-  };
-  append(static_cast<uint64_t>(cameras.size()));
-  for (const auto& [id, camera] : cameras) {
-    append(id);
-    append(static_cast<int32_t>(camera.lens));
-    append(static_cast<uint64_t>(camera.width));
-    append(static_cast<uint64_t>(camera.height));
-    for (int i = 0; i < lensParameterCount(camera.lens); ++i) append(camera.parameters[static_cast<size_t>(i)]);
-  }
-  return bytes;
-}
+constexpr const char* kAdjustments = "12";  // iterations at most; five to eight reach the tolerance
+constexpr const char* kTolerance = "1e-6";  // change of the cost in an iteration, relative to it, that ends them
+constexpr int kRefits = 2;                  // without outlying observations
 
 Camera withDecentring(Camera camera) {
   if (camera.lens != LensModel::radial) return camera;
@@ -194,38 +179,45 @@ void PhotoModels::extend(bool resumes, const Watch& watch) {
 }
 
 void PhotoModels::adjust(const Watch& watch) {
-  const fs::path input = last(false), begun = folder_ / "adjusted.begun", partial = folder_ / "adjusted.partial";
+  const fs::path input = last(false), partial = folder_ / "adjusted.partial";
   const ColmapModel before = readColmapModel(input);
   std::map<uint32_t, size_t> photosByCamera;
   for (const ColmapModel::Image& image : before.images) ++photosByCamera[image.camera];
   const bool allHaveMany = std::all_of(photosByCamera.begin(), photosByCamera.end(),
                                        [](const auto& entry) { return entry.second >= kPhotosForFullLens; });
-  const auto adjustWith = [&](bool fullLens) {
-    std::map<uint32_t, Camera> cameras;
-    for (const auto& [id, camera] : before.cameras)
-      cameras[id] = fullLens && photosByCamera[id] >= kPhotosForFullLens ? withDecentring(camera) : camera;
-    for (const fs::path& folder : {begun, partial}) {
+  // Returns whether a plausible model results, which then is in `partial`.
+  const auto adjustTo = [&](const ColmapModel& model, bool fullLens) {
+    const fs::path begun = folder_ / "adjusted.begun", result = folder_ / "adjusted.result";
+    for (const fs::path& folder : {begun, result}) {
       removeFolder(folder);
       makeFolder(folder);
     }
-    for (const char* name : {"images.bin", "points3D.bin"})
-      fs::copy_file(input / name, begun / name, fs::copy_options::overwrite_existing);
-    writeFileAtomically(begun / "cameras.bin", encodeCameras(cameras));
+    writeColmapModel(model, begun);
     runColmap("adjusting",
-              {"bundle_adjuster", "--input_path", begun.string(), "--output_path", partial.string(),
-               "--BundleAdjustment.max_num_iterations", kAdjustments, "--BundleAdjustment.refine_principal_point",
-               fullLens && allHaveMany ? "1" : "0"},
+              {"bundle_adjuster", "--input_path", begun.string(), "--output_path", result.string(),
+               "--BundleAdjustment.max_num_iterations", kAdjustments, "--BundleAdjustment.function_tolerance",
+               kTolerance, "--BundleAdjustment.refine_principal_point", fullLens && allHaveMany ? "1" : "0"},
               [&] { watch(static_cast<int64_t>(before.images.size())); });
-    return !photosIn(partial).empty() && isPlausible(readColmapModel(partial), before);
+    const bool isUsable = !photosIn(result).empty() && isPlausible(readColmapModel(result), before);
+    if (isUsable) replaceFolder(result, partial);
+    for (const fs::path& folder : {begun, result}) removeFolder(folder);
+    return isUsable;
   };
-  if (!adjustWith(true) && !adjustWith(false)) {
+  ColmapModel withFullLens = before;
+  for (auto& [id, camera] : withFullLens.cameras)
+    if (photosByCamera[id] >= kPhotosForFullLens) camera = withDecentring(camera);
+  removeFolder(partial);
+  const bool fullLens = adjustTo(withFullLens, true);
+  if (fullLens || adjustTo(before, false)) {
+    for (int i = 0; i < kRefits; ++i) {
+      ColmapModel model = readColmapModel(partial);
+      if (removeOutlyingObservations(model) == 0 || !adjustTo(model, fullLens)) break;
+    }
+  } else {
     warn("the final bundle adjustment gives no plausible lens; poses stay as they were estimated");
-    removeFolder(partial);
     fs::copy(input, partial);
   }
   replaceFolder(partial, folder_ / "adjusted");
-  std::error_code status;
-  fs::remove_all(begun, status);
 }
 
 PhotoModels::Count PhotoModels::countMapped() const {

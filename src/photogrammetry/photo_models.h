@@ -40,9 +40,9 @@ class PhotoModels {
   void extend(bool resumes, const Watch& watch);
   void discardJoined() const;
 
-  // Adjusts poses, points and lenses together. Cameras of many photos get a lens with decentring; if all cameras have
-  // many, also a free principal point, which the mapper keeps in the middle: it would be too weakly determined while
-  // there are few photos.
+  // Adjusts poses, points and lenses together, then again without the observations that disagree with the result.
+  // Cameras of many photos get a lens with decentring; if all cameras have many, also a free principal point, which the
+  // mapper keeps in the middle: it would be too weakly determined while there are few photos.
   void adjust(const Watch& watch);
   void discardAdjusted() const;
 

@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "import/colmap_model.h"
+#include "photogrammetry/colmap_writer.h"
 #include "photogrammetry/testing/fake_colmap.h"
 
 namespace tessera {
@@ -280,6 +281,49 @@ TEST_F(PhotoModelsTest, AreAdjustedWithASimpleLensIfAFullOneIsNotPlausible) {
   estimated.adjust(ignore);
   EXPECT_EQ(readTextFile(folder_ / "options"), "1\n0\n");
   EXPECT_EQ(adjustedCamera().lens, LensModel::radial);
+}
+
+// A model whose photos show points below them, the third one with a wrong match in ten.
+ColmapModel withWrongMatches(const fs::path& folder) {
+  ColmapModel model = readColmapModel(folder);
+  for (ColmapModel::Image& image : model.images) {
+    image.keypoints.clear();
+    for (const ColmapModel::Point& point : model.points) {
+      const Vec3d x = point.point.xInWorld + Vec3d(image.translation[0], 0, 0);
+      const double wrong =
+          image.id == 3 && point.id % 10 == 0 ? 3 : 0.1 * static_cast<double>((point.id + image.id) % 3);
+      image.keypoints.push_back({400 + 640 * x.x() / x.z() + wrong, 300, point.id});
+    }
+  }
+  return model;
+}
+
+TEST_F(PhotoModelsTest, AreAdjustedAgainWithoutObservationsThatDisagree) {
+  const std::string first = prepared("a", numbers(0, 12));
+  writeColmapModel(withWrongMatches(first), first);
+  PhotoModels estimated = models(adjustingScript(first, "none"));
+  estimated.map(false, ignore);
+  estimated.adjust(ignore);
+  // The second time, nothing disagrees any more.
+  EXPECT_EQ(readTextFile(folder_ / "options"), "0\n0\n");
+  for (const ColmapModel::Image& image : readColmapModel(folder_ / "poses/adjusted").images)
+    EXPECT_EQ(image.keypoints.size(), image.id == 3 ? 900u : 1000u) << image.id;
+}
+
+TEST_F(PhotoModelsTest, StayAsTheyWereIfWithoutTheseTheyAreNotPlausible) {
+  const std::string first = prepared("a", numbers(0, 12)), fewer = prepared("fewer", numbers(0, 11));
+  writeColmapModel(withWrongMatches(first), first);
+  const std::string again = (folder_ / "again").string();
+  PhotoModels estimated = models("case $command in mapper) cp -r " + first +
+                                 " $output_path/0;;\nbundle_adjuster) if [ -e " + again + " ]; then cp " + fewer +
+                                 "/* $output_path; else cp $input_path/* $output_path; fi; touch " + again + ";; esac");
+  estimated.map(false, ignore);
+  estimated.adjust(ignore);
+  EXPECT_TRUE(fs::exists(again));
+  EXPECT_EQ(estimated.read().capture.photos.size(), 12u);
+  for (const ColmapModel::Image& image : readColmapModel(folder_ / "poses/adjusted").images)
+    EXPECT_EQ(image.keypoints.size(), 1000u) << image.id;
+  EXPECT_FALSE(fs::exists(folder_ / "poses/adjusted.result"));
 }
 
 }  // namespace

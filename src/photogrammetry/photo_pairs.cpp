@@ -12,8 +12,6 @@
 namespace tessera {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180;
-
 double sharedShare(const PhotoFootprint& a, const PhotoFootprint& b) {
   if ((a.middle - b.middle).norm() > a.radius + b.radius) return 0;
   const auto shared = [](const PhotoFootprint& of, const PhotoFootprint& in) {
@@ -56,6 +54,7 @@ struct Candidate {
 void pairByFootprint(const PhotoList& list, const std::vector<bool>& tellPlace, const PairOptions& options,
                      std::set<PhotoPair>& pairs) {
   const std::vector<PhotoFootprint> prints = photoFootprints(list, tellPlace);
+  const double minCosine = std::cos(options.maxAngle * std::numbers::pi / 180);
   std::vector<std::vector<Candidate>> candidates(prints.size());
   std::vector<Candidate> all;
   for (size_t a = 0; a < prints.size(); ++a) {
@@ -65,7 +64,7 @@ void pairByFootprint(const PhotoList& list, const std::vector<bool>& tellPlace, 
       const Candidate candidate{overlap, static_cast<int>(a), static_cast<int>(b)};
       all.push_back(candidate);
       const double cosine = prints[a].worldFromCamera.col(2).dot(prints[b].worldFromCamera.col(2));
-      if (overlap < options.minOverlap || cosine < std::cos(options.maxAngle * kDegree)) continue;
+      if (overlap < options.minOverlap || cosine < minCosine) continue;
       candidates[a].push_back(candidate);
       candidates[b].push_back(candidate);
     }

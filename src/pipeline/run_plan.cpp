@@ -130,7 +130,7 @@ double relativeSeconds(const MatchingRates& rates) {
 // The constants are fitted to four sets of 18 to 487 photos: docs/benchmarks.md, "Photographs without poses". Mapping
 // adjusts all photos again and again: its time follows from their number more closely than from that of the inliers.
 MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates) {
-  constexpr double kMapping = 0.187, kMappingGrowth = 1.274, kAdjusting = 0.0243, kAdjustingGrowth = 1.316;
+  constexpr double kMapping = 0.187, kMappingGrowth = 1.274, kAdjusting = 0.033, kAdjustingGrowth = 1.316;
   constexpr double kMargin = 1.4;        // of inliers and features, for memory, before they are known
   constexpr double kOfNeighbours = 0.6;  // inliers of all pairs, relative to those of neighbours
   constexpr double kSecondsPerWordFeature = 0.35e-3, kPhotosForWords = 60;
