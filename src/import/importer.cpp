@@ -255,6 +255,18 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
   return outcomes;
 }
 
+// Throws Error if no pixel of any photo is left.
+void checkMasks(const std::vector<Photo>& photos, const fs::path& out, ThreadPool& pool) {
+  std::vector<char> areExcluded(photos.size(), 0);
+  pool.run(photos.size(), [&](size_t i, int) {
+    if (!photos[i].mask.empty()) areExcluded[i] = excludesAll(readImage(photos[i].mask).image) ? 1 : 0;
+  });
+  std::vector<std::string> excluded;
+  for (size_t i = 0; i < photos.size(); ++i)
+    if (areExcluded[i] != 0) excluded.push_back(photos[i].name);
+  warnOfExcluded(excluded, photos.size(), out / "masks");
+}
+
 // Sets the exposures of photos whose source does not know them, from EXIF. Nothing is set if most have no tags.
 void setExposures(Capture& capture, const std::vector<PhotoFacts>& facts) {
   std::vector<std::optional<double>> stops;
@@ -372,6 +384,7 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
   if (capture.photos.empty()) {
     throw Error(from, "", "no photo of it can be decoded", "see the warnings above");
   }
+  checkMasks(capture.photos, out, pool);
   chooseSplit(source, options.holdout);
   capture.root = out;
   writeCapture(capture);

@@ -201,6 +201,26 @@ TEST_F(Import, ImportsMasksAndDepthMaps) {
   EXPECT_TRUE(logged("1 masks are missing or unreadable")) << log_;
 }
 
+// Such as masks that hold the classes 0 and 1.
+TEST_F(Import, RefusesMasksThatExcludeEverything) {
+  for (const std::string name : {"a", "b"}) {
+    add("images/" + name + ".png", 16, 12, R"(,"mask_path":"masks/)" + name + R"(.png")");
+    writePng(source_ / ("masks/" + name + ".png"), ImageU8(16, 12, 1, 1));
+  }
+  write();
+  try {
+    run();
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("masks: excludes all pixels of all photos"), std::string::npos)
+        << error.what();
+  }
+  EXPECT_FALSE(fs::exists(out_ / "transforms.json"));
+  writePng(source_ / "masks/b.png", ImageU8(16, 12, 1, 255));
+  EXPECT_EQ(run().photos.size(), 2u);
+  EXPECT_TRUE(logged("masks exclude all pixels of 1 photos (images/a.png)")) << log_;
+}
+
 TEST_F(Import, ScalesDepthMapsOfEitherKindByAppliedScale) {
   add("images/a.png", 16, 12, R"(,"depth_file_path":"depth/a.exr")");
   add("images/b.png", 16, 12, R"(,"depth_file_path":"depth/b.png")");
@@ -259,7 +279,9 @@ TEST_F(Import, ReusesNoImageOfAnotherSource) {
   frames_.clear();
   add("images/a.png", 16, 12, mask);
   writePng(source_ / "images/a.png", gradientPicture(16, 12, 3, 100));
-  writePng(source_ / "masks/a.png", ImageU8(16, 12, 1, 0));
+  ImageU8 black(16, 12, 1, 0);
+  std::fill(black.pixels.end() - 4 * 16, black.pixels.end(), uint8_t{255});  // but for some rows
+  writePng(source_ / "masks/a.png", black);
   write();
   const fs::path second = source_;
   const auto longAgo = fs::file_time_type::clock::now() - std::chrono::hours(1000);

@@ -7,6 +7,7 @@
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "base/log.h"
 
 namespace tessera {
 namespace {
@@ -109,6 +110,19 @@ ImageU8 toMask(const ImageU8& image, bool inverted) {
     mask.pixels[i] = (inverted ? brightest == 0 : brightest >= 128) ? 255 : 0;
   }
   return mask;
+}
+
+bool excludesAll(const ImageU8& mask) {
+  return std::all_of(mask.pixels.begin(), mask.pixels.end(), [](uint8_t value) { return value == 0; });
+}
+
+void warnOfExcluded(const std::vector<std::string>& photos, size_t count, const fs::path& masks) {
+  if (photos.empty()) return;
+  if (photos.size() == count) {
+    throw Error(masks.string(), "", "excludes all pixels of all photos",
+                "make white what is to be used: what is less than half as bright is excluded");
+  }
+  warn("masks exclude all pixels of {} photos ({}{})", photos.size(), photos[0], photos.size() > 1 ? ", ..." : "");
 }
 
 std::optional<ImageU8> readMask(const fs::path& source, int width, int height, bool inverted) {

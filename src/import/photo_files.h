@@ -4,6 +4,8 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "base/file.h"
 #include "base/image.h"
@@ -32,6 +34,11 @@ std::optional<ImageU8> readMask(const fs::path& source, int width, int height, b
 // Returns a mask of one channel, 0 or 255: 255 where a colour of the image is bright, or, if `inverted`, where it is
 // black.
 ImageU8 toMask(const ImageU8& image, bool inverted);
+// Whether a mask of one channel, 0 or 255, excludes all pixels.
+bool excludesAll(const ImageU8& mask);
+// Warns of the photos whose masks exclude all their pixels. Throws Error naming the folder `masks` if these are all
+// `count` photos: then the masks are likely to state something else, such as classes 0 and 1.
+void warnOfExcluded(const std::vector<std::string>& photos, size_t count, const fs::path& masks);
 
 // Whether the target is there, of that size and not older than its source.
 bool isReady(const fs::path& source, const fs::path& target, int width, int height);

@@ -117,13 +117,17 @@ void PhotoMasks::addTo(SourceCapture& source) const {
 
 bool writeMasks(const PhotoList& list, const fs::path& folder) {
   bool areThere = false;
+  std::vector<std::string> excluded;
   for (const ListedPhoto& photo : list.photos) {
     if (photo.mask.empty()) continue;
     areThere = true;
     const fs::path target = folder / (photo.safeName + ".png");
     std::error_code status;
-    if (!fs::exists(target, status)) writePng(target, toMask(readImage(photo.mask).image, false));
+    const ImageU8 mask = toMask(readImage(photo.mask).image, false);
+    if (excludesAll(mask)) excluded.push_back(photo.name);
+    if (!fs::exists(target, status)) writePng(target, mask);
   }
+  if (areThere) warnOfExcluded(excluded, list.photos.size(), "--masks");
   return areThere;
 }
 

@@ -32,7 +32,8 @@ class PhotoMasks {
 };
 
 // Writes the masks of a list as COLMAP reads them, under the safe names of their photos: PNGs of one channel, 0 or 255.
-// Those that are there stay. Returns whether there are any. Throws Error if one cannot be decoded or written.
+// Those that are there stay. Returns whether there are any. Warns of those that
+// exclude whole photos; throws Error if these are all photos, or if one cannot be decoded or written.
 bool writeMasks(const PhotoList& list, const fs::path& folder);
 
 }  // namespace tessera

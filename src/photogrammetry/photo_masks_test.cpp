@@ -119,6 +119,17 @@ TEST_F(PhotoMasksOf, AListReachFeatures) {
   EXPECT_FALSE(fs::exists(folder_ / "poses/masks"));
 }
 
+TEST_F(PhotoMasksOf, AListAreRefusedIfTheyExcludeEverything) {
+  for (const char* name : {"a/one.png", "a/two.png", "b/three.png"}) writePng(masks_ / name, ImageU8(16, 12, 1, 1));
+  PhotoMasks(masks_).addTo(list_);
+  const auto write = [this] { return errorMessage([this] { writeMasks(list_, folder_ / "poses/masks"); }); };
+  EXPECT_TRUE(contains(write(), "--masks: excludes all pixels of all photos")) << write();
+  EXPECT_TRUE(contains(write(), "--masks: excludes all pixels of all photos")) << "masks that have been written";
+  writeMask("b/three.png");
+  fs::remove_all(folder_ / "poses/masks");
+  EXPECT_EQ(write(), "");
+}
+
 // Of the installed program: no feature lies where a mask is black.
 TEST_F(PhotoMasksOf, AListKeepColmapFromFeatures) {
   ChildProcess process;
