@@ -8,6 +8,7 @@
 
 #include "base/child_process.h"
 #include "base/error.h"
+#include "base/log.h"
 
 namespace tessera {
 namespace {
@@ -43,7 +44,8 @@ ColmapProgram::ColmapProgram(fs::path log, std::string program) : log_(std::move
   }
 }
 
-void ColmapProgram::run(std::vector<std::string> arguments, const std::function<void()>& watch) {
+void ColmapProgram::run(std::vector<std::string> arguments, const std::function<void()>& watch,
+                        const std::function<bool()>& isDone) {
   const std::string command = arguments.at(0);
   arguments.insert(arguments.begin(), program_);
   ChildProcess process;
@@ -62,6 +64,10 @@ void ColmapProgram::run(std::vector<std::string> arguments, const std::function<
   if (isKilled(process) || process.lastWords(kLastWords).find("bad_alloc") != std::string::npos) {
     throw ColmapKilled(program_ + " " + command, "", end,
                        "if memory ran out, close other programs or use fewer threads; run again to go on");
+  }
+  if (isDone && isDone()) {
+    inform("{} {} {}, but had finished", program_, command, end);
+    return;
   }
   throw Error(program_ + " " + command, "", end + ": " + process.lastWords(200),
               "see " + log_.string() + "; run again to go on");

@@ -34,8 +34,10 @@ class ColmapProgram {
 
   // Runs a command, such as {"mapper", "--output_path", "sparse"}. `watch` is called now and then while it runs.
   // Throws ColmapKilled if it was ended from outside or memory or disk ran out, and else Error with its last words if
-  // it fails. That it reports success means little: callers look at what it wrote.
-  void run(std::vector<std::string> arguments, const std::function<void()>& watch = {});
+  // it reports failure, unless `isDone` says that it has written all of its result. That it reports success means
+  // little: callers look at what it wrote.
+  void run(std::vector<std::string> arguments, const std::function<void()>& watch = {},
+           const std::function<bool()>& isDone = {});
 
  private:
   fs::path log_;

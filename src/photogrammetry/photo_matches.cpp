@@ -55,9 +55,10 @@ int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes) {
 PhotoMatches::PhotoMatches(fs::path folder, const PhotoList& list, ColmapSettings settings)
     : folder_(std::move(folder)), list_(list), settings_(std::move(settings)) {}
 
-void PhotoMatches::runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look) {
+void PhotoMatches::runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look,
+                             const std::function<bool()>& isDone) {
   ColmapProgram colmap(folder_ / fmt::format("{}.log", step), settings_.program);
-  colmap.run(std::move(arguments), look);
+  colmap.run(std::move(arguments), look, isDone);
 }
 
 void PhotoMatches::discard() const {
@@ -105,7 +106,8 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
                                        std::to_string(threads)};
     if (writeMasks(list_, folder_ / "masks"))
       arguments.insert(arguments.end(), {"--ImageReader.mask_path", (folder_ / "masks").string()});
-    runColmap("features", std::move(arguments), [&] { watch(done()); });
+    runColmap(
+        "features", std::move(arguments), [&] { watch(done()); }, [&] { return done() == count; });
   }
   int64_t features = 0;
   for (const auto& [photo, number] : ColmapDatabase(database()).features()) features += number;
@@ -168,7 +170,8 @@ void PhotoMatches::match(const std::vector<PhotoPair>& pairs, const Watch& watch
         "matches",
         {"matches_importer", "--database_path", database().string(), "--match_list_path", list.string(), "--match_type",
          "pairs", "--SiftMatching.use_gpu", "0", "--SiftMatching.num_threads", settings_.threadsText()},
-        [&] { watch(static_cast<int64_t>(pairs.size() - missing.size() + begin)); });
+        [&] { watch(static_cast<int64_t>(pairs.size() - missing.size() + begin)); },
+        [&] { return notCompared().size() <= missing.size() - end; });
     watch(static_cast<int64_t>(pairs.size() - missing.size() + end));
   }
   // Whatever the program reported.

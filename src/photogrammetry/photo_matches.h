@@ -49,7 +49,8 @@ class PhotoMatches {
 
  private:
   fs::path database() const { return folder_ / "database.db"; }
-  void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
+  void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look,
+                 const std::function<bool()>& isDone = {});
 
   fs::path folder_;
   const PhotoList& list_;

@@ -113,6 +113,21 @@ TEST(PhotoMatches, TakeAsManyThreadsAsMemoryAllows) {
   EXPECT_GE(extractionThreads(0, 800 * 600, 16 * kGiB), 1);
 }
 
+// Pair 0 and 2 is in the tables; the script adds another, and fails.
+TEST(PhotoMatches, AreDoneIfTheTablesSaySoWhateverTheProgramReports) {
+  const TemporaryFolder folder;
+  makeDatabase(folder / "database.db");
+  makeDatabase(folder / "later.db");
+  addInliers(folder / "later.db", 1, 2, 60);
+  const PhotoList list = numberedPhotos(3);
+  const auto match = [&](const std::string& script) {
+    PhotoMatches matches(folder.path(), list, {.program = writeColmap(folder, script).string()});
+    return errorMessage([&] { matches.match({{0, 2}, {1, 2}}, [](int64_t) {}); });
+  };
+  EXPECT_NE(match("echo broken; exit 1").find("broken"), std::string::npos);
+  EXPECT_EQ(match("cp " + (folder / "later.db").string() + " $database_path; exit 1"), "");
+}
+
 TEST(PhotoMatches, SayWhyPhotosHaveNoPose) {
   const TemporaryFolder folder;
   makeDatabase(folder / "database.db");

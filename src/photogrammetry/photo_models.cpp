@@ -56,9 +56,10 @@ bool isPlausible(const ColmapModel& model, const ColmapModel& before) {
 PhotoModels::PhotoModels(fs::path folder, const PhotoList& list, ColmapSettings settings)
     : folder_(std::move(folder)), list_(list), settings_(std::move(settings)) {}
 
-void PhotoModels::runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look) {
+void PhotoModels::runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look,
+                            const std::function<bool()>& isDone) {
   ColmapProgram colmap(folder_ / fmt::format("{}.log", step), settings_.program);
-  colmap.run(std::move(arguments), look);
+  colmap.run(std::move(arguments), look, isDone);
 }
 
 void PhotoModels::discardMapped() const {
@@ -124,10 +125,11 @@ int PhotoModels::join(const Watch& watch) {
       }
       fs::remove_all(attempt, status);
       makeFolder(attempt);
-      runColmap("joining",
-                {"model_merger", "--input_path1", whole.folder.string(), "--input_path2", piece->folder.string(),
-                 "--output_path", attempt.string()},
-                [&] { watch(0); });
+      runColmap(
+          "joining",
+          {"model_merger", "--input_path1", whole.folder.string(), "--input_path2", piece->folder.string(),
+           "--output_path", attempt.string()},
+          [&] { watch(0); }, [&] { return !photosIn(attempt).empty(); });
       // If it fails, it reports success and writes the first model.
       const std::set<int> photos = photosIn(attempt);
       if (photos.size() <= whole.photos.size() || !agreesWithGps(attempt, whole.folder)) {
@@ -149,15 +151,17 @@ int PhotoModels::join(const Watch& watch) {
     removeFolder(folder);
     makeFolder(folder);
   }
-  runColmap("joining",
-            {"point_triangulator", "--database_path", (folder_ / "database.db").string(), "--image_path",
-             (folder_ / "images").string(), "--input_path", result.string(), "--output_path", points.string(),
-             "--Mapper.num_threads", settings_.threadsText()},
-            [&] { watch(0); });
-  runColmap("joining",
-            {"bundle_adjuster", "--input_path", points.string(), "--output_path", adjusted.string(),
-             "--BundleAdjustment.max_num_iterations", kAdjustments},
-            [&] { watch(0); });
+  runColmap(
+      "joining",
+      {"point_triangulator", "--database_path", (folder_ / "database.db").string(), "--image_path",
+       (folder_ / "images").string(), "--input_path", result.string(), "--output_path", points.string(),
+       "--Mapper.num_threads", settings_.threadsText()},
+      [&] { watch(0); }, [&] { return !photosIn(points).empty(); });
+  runColmap(
+      "joining",
+      {"bundle_adjuster", "--input_path", points.string(), "--output_path", adjusted.string(),
+       "--BundleAdjustment.max_num_iterations", kAdjustments},
+      [&] { watch(0); }, [&] { return !photosIn(adjusted).empty(); });
   if (photosIn(adjusted).size() != whole.photos.size()) {
     throw Error(adjusted.string(), "", "lacks photos of the models that were joined",
                 "see joining.log beside it; run again to go on");
@@ -193,11 +197,12 @@ void PhotoModels::adjust(const Watch& watch) {
       makeFolder(folder);
     }
     writeColmapModel(model, begun);
-    runColmap("adjusting",
-              {"bundle_adjuster", "--input_path", begun.string(), "--output_path", result.string(),
-               "--BundleAdjustment.max_num_iterations", kAdjustments, "--BundleAdjustment.function_tolerance",
-               kTolerance, "--BundleAdjustment.refine_principal_point", fullLens && allHaveMany ? "1" : "0"},
-              [&] { watch(static_cast<int64_t>(before.images.size())); });
+    runColmap(
+        "adjusting",
+        {"bundle_adjuster", "--input_path", begun.string(), "--output_path", result.string(),
+         "--BundleAdjustment.max_num_iterations", kAdjustments, "--BundleAdjustment.function_tolerance", kTolerance,
+         "--BundleAdjustment.refine_principal_point", fullLens && allHaveMany ? "1" : "0"},
+        [&] { watch(static_cast<int64_t>(before.images.size())); }, [&] { return !photosIn(result).empty(); });
     const bool isUsable = !photosIn(result).empty() && isPlausible(readColmapModel(result), before);
     if (isUsable) replaceFolder(result, partial);
     for (const fs::path& folder : {begun, result}) removeFolder(folder);

@@ -83,7 +83,8 @@ class PhotoModels {
   // Returns these photos, and those that are well matched with one of them.
   std::set<int> withMatched(std::set<int> photos) const;
   void runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch);
-  void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look);
+  void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look,
+                 const std::function<bool()>& isDone = {});
   bool agreesWithGps(const fs::path& joined, const fs::path& before) const;
   SourceCapture readFrom(const fs::path& model) const;
 

@@ -60,6 +60,11 @@ void thinSnapshots(const fs::path& folder) {
   for (size_t i = kKeptSnapshots; i < complete.size(); ++i) fs::remove_all(complete[i].second, status);
 }
 
+// Whether the mapper has written a model into a folder, or into a folder in it.
+bool holdsModel(const fs::path& folder) {
+  return !photosIn(folder).empty() || !piecesIn(folder).empty();
+}
+
 // Going on from a model, the mapper writes one model into the folder itself, not into 0. Moves it there; returns
 // whether there is one.
 bool moveIntoSubfolder(const fs::path& folder) {
@@ -99,10 +104,11 @@ void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool 
                                      "--Mapper.snapshot_images_freq", std::to_string(kPhotosPerSnapshot)});
   const fs::path from = photosIn(begun).empty() ? input : begun;
   if (!from.empty()) arguments.insert(arguments.end(), {"--input_path", from.string()});
-  runColmap("mapping", std::move(arguments), [&] {
+  const auto look = [&] {
     thinSnapshots(snapshots);
     watch(lastRegistered(log));
-  });
+  };
+  runColmap("mapping", std::move(arguments), look, [&] { return holdsModel(output); });
 }
 
 void PhotoModels::map(bool resumes, const Watch& watch) {
@@ -251,7 +257,8 @@ std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<i
                       std::to_string(pair->second + 1), "--Mapper.max_num_models", "1"});
   }
   try {
-    runColmap("mapping", std::move(arguments), [&] { watch(lastRegistered(log)); });
+    runColmap(
+        "mapping", std::move(arguments), [&] { watch(lastRegistered(log)); }, [&] { return holdsModel(rest); });
   } catch (const ColmapKilled&) {
     throw;
   } catch (const Error& error) {

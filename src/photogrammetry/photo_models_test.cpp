@@ -47,6 +47,16 @@ TEST_F(PhotoModelsTest, SayThatNoPhotosCouldBePlaced) {
   EXPECT_FALSE(fs::exists(folder_ / "poses/sparse"));
 }
 
+// A program may fail after its work, when it ends.
+TEST_F(PhotoModelsTest, CountThoughTheProgramReportsFailureAfterwards) {
+  PhotoModels estimated = models("case $command in mapper) cp -r " + prepared("a", numbers(0, 20)) +
+                                 " $output_path/0;; bundle_adjuster) cp $input_path/* $output_path;; esac; exit 139");
+  estimated.map(false, ignore);
+  EXPECT_EQ(estimated.unplaced(), numbers(20, 50));
+  estimated.adjust(ignore);
+  EXPECT_EQ(estimated.unplaced(), numbers(20, 50));
+}
+
 TEST_F(PhotoModelsTest, AreRefusedIfTheySeeHardlyAnyPoint) {
   writeModel(folder_ / "turned", numbers(0, 5), {}, 40);
   PhotoModels estimated = models("cp -r " + (folder_ / "turned").string() + " $output_path/0");
