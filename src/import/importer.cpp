@@ -158,6 +158,8 @@ void runMaskCommand(SourceCapture& source, const std::vector<fs::path>& targets,
   const MaskCommand command(text);
   std::vector<Photo>& photos = source.capture.photos;
   Progress progress("masks", static_cast<int64_t>(photos.size()), "photos");
+  constexpr size_t kFirst = 20;  // photos, after which it is likely that all masks will exclude everything
+  size_t excluded = 0;
   for (size_t i = 0; i < photos.size(); ++i) {
     if (outcomes.photos[i] != FileOutcome::ready) continue;
     const ImageInfo image = probeImageFile(photos[i].image);
@@ -170,6 +172,9 @@ void runMaskCommand(SourceCapture& source, const std::vector<fs::path>& targets,
       command.makeMask(photos[i].image, targets[i], other.value_or(ImageU8()));
     }
     photos[i].mask = targets[i];
+    if (i < kFirst) excluded += excludesAll(readImage(targets[i]).image) ? 1 : 0;
+    if (i + 1 == kFirst && excluded == kFirst)
+      warn("the masks of the first {} photos exclude all their pixels: white is what is used", kFirst);
     progress.update(static_cast<int64_t>(i) + 1);
   }
   progress.finish();
@@ -255,8 +260,9 @@ Outcomes importPictures(SourceCapture& source, const std::vector<PhotoFacts>& fa
   return outcomes;
 }
 
-// Throws Error if no pixel of any photo is left.
-void checkMasks(const std::vector<Photo>& photos, const fs::path& out, ThreadPool& pool) {
+// Throws Error if no pixel of any photo is left; then removes masks that a program has made, which would be taken for
+// those of the program when it has been corrected.
+void checkMasks(const std::vector<Photo>& photos, const fs::path& out, bool areMade, ThreadPool& pool) {
   std::vector<char> areExcluded(photos.size(), 0);
   pool.run(photos.size(), [&](size_t i, int) {
     if (!photos[i].mask.empty()) areExcluded[i] = excludesAll(readImage(photos[i].mask).image) ? 1 : 0;
@@ -264,6 +270,9 @@ void checkMasks(const std::vector<Photo>& photos, const fs::path& out, ThreadPoo
   std::vector<std::string> excluded;
   for (size_t i = 0; i < photos.size(); ++i)
     if (areExcluded[i] != 0) excluded.push_back(photos[i].name);
+  std::error_code status;
+  if (areMade && excluded.size() == photos.size())
+    for (const Photo& photo : photos) fs::remove(photo.mask, status);
   warnOfExcluded(excluded, photos.size(), out / "masks");
 }
 
@@ -384,7 +393,7 @@ Capture importSource(SourceCapture source, const std::string& from, const fs::pa
   if (capture.photos.empty()) {
     throw Error(from, "", "no photo of it can be decoded", "see the warnings above");
   }
-  checkMasks(capture.photos, out, pool);
+  checkMasks(capture.photos, out, !options.maskCommand.empty(), pool);
   chooseSplit(source, options.holdout);
   capture.root = out;
   writeCapture(capture);

@@ -99,6 +99,15 @@ TEST_F(MaskCommands, ThatFailNamePhotoAndCommand) {
   EXPECT_EQ(import(command()).photos.size(), 2u) << "after the program was corrected";
 }
 
+// Then the program is corrected, which its command does not tell.
+TEST_F(MaskCommands, AreRunAgainAfterTheirMasksExcludedEverything) {
+  const ImageU8 prepared = readImage(folder_ / "prepared.png").image;
+  writePng(folder_ / "prepared.png", ImageU8(16, 12, 1, 1));
+  EXPECT_NE(failure(command()).find("excludes all pixels of all photos"), std::string::npos);
+  writePng(folder_ / "prepared.png", prepared);
+  EXPECT_EQ(readImage(import(command()).photos[0].mask).image.at(3, 3)[0], 255);
+}
+
 TEST_F(MaskCommands, ThatAreMalformedAreRefusedAtOnce) {
   EXPECT_NE(failure(" ").find("names no program"), std::string::npos);
   EXPECT_NE(failure(command(" {photo}")).find("only one of {photo} and {mask}"), std::string::npos);

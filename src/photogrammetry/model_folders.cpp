@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "import/colmap_model.h"
+#include "photogrammetry/colmap_program.h"
 
 namespace tessera {
 
@@ -44,6 +45,17 @@ std::vector<Piece> piecesIn(const fs::path& folder) {
 
 uint64_t statedPhotos(const fs::path& folder) {
   return statedCount(folder / "points3D.bin") > 0 ? statedCount(folder / "images.bin") : 0;
+}
+
+void requireWhole(const fs::path& folder) {
+  const auto check = [](const fs::path& model) {
+    if (statedCount(model / "images.bin") == 0 || !photosIn(model).empty()) return;
+    throw ColmapKilled(model.string(), "", "was not written to its end",
+                       "check free space and quota of the disk, and run again to go on");
+  };
+  check(folder);
+  std::error_code status;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, status)) check(entry.path());
 }
 
 void removeFolder(const fs::path& folder) {

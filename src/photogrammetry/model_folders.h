@@ -27,6 +27,10 @@ uint64_t statedCount(const fs::path& path);
 // Returns the number of photos that a model states, without reading all of it; 0 if it was not written to its end.
 uint64_t statedPhotos(const fs::path& folder);
 
+// Throws ColmapKilled if a model in a folder, or the folder itself, was not written to its end: COLMAP does not notice
+// that a disk or a quota is full.
+void requireWhole(const fs::path& folder);
+
 // The following throw Error if they cannot do so.
 void removeFolder(const fs::path& folder);
 void makeFolder(const fs::path& folder);

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "base/order_statistics.h"
 
@@ -15,6 +16,16 @@ constexpr double kMedians = 3;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr size_t kLeastViews = 2;        // of a point
 constexpr size_t kFewObservations = 30;  // of a photo, with which the mapper places it at least
+
+// How many photos show a point, a photo counting once.
+struct Views {
+  size_t count = 0, last = std::numeric_limits<size_t>::max();
+
+  void add(size_t image) {
+    if (image != last) ++count;
+    last = image;
+  }
+};
 
 using PointPlaces = std::unordered_map<uint64_t, Vec3d>;
 
@@ -51,29 +62,50 @@ size_t removeOutlyingObservations(ColmapModel& model) {
   if (all.empty()) return 0;
   const double median = upperMedian(all);
   if (median == kInfinity) return 0;
-  std::unordered_map<uint64_t, size_t> views;  // that are left
-  size_t before = 0, left = 0;
+  std::vector<double> limits(model.images.size(), kInfinity);
   for (size_t i = 0; i < model.images.size(); ++i) {
-    before += model.images[i].keypoints.size();
-    if (errors[i].empty()) continue;
+    if (errors[i].size() < kFewObservations) continue;
     std::vector<double> own = errors[i];
-    const double limit = own.size() < kFewObservations ? kInfinity : kMedians * std::max(median, upperMedian(own));
-    std::vector<ColmapModel::Keypoint> agreeing;
-    for (size_t k = 0; k < errors[i].size(); ++k)
-      if (errors[i][k] < kInfinity && errors[i][k] <= limit) agreeing.push_back(model.images[i].keypoints[k]);
-    for (const ColmapModel::Keypoint& keypoint : agreeing) ++views[keypoint.point];
-    model.images[i].keypoints = std::move(agreeing);
+    limits[i] = kMedians * std::max(median, upperMedian(own));
   }
+  std::unordered_set<uint64_t> needed;  // points that photos with few others keep, in all their photos
+  const auto agrees = [&](size_t image, size_t keypoint) {
+    const double error = errors[image].empty() ? 0 : errors[image][keypoint];
+    return error < kInfinity &&
+           (error <= limits[image] || needed.contains(model.images[image].keypoints[keypoint].point));
+  };
+  std::unordered_map<uint64_t, Views> views;
+  const auto countViews = [&] {
+    views.clear();
+    for (size_t i = 0; i < model.images.size(); ++i)
+      for (size_t k = 0; k < model.images[i].keypoints.size(); ++k)
+        if (agrees(i, k)) views[model.images[i].keypoints[k].point].add(i);
+  };
   const auto isSeen = [&](uint64_t point) {
     const auto count = views.find(point);
-    return count != views.end() && count->second >= kLeastViews;
+    return count != views.end() && count->second.count >= kLeastViews;
   };
-  for (ColmapModel::Image& image : model.images) {
-    std::erase_if(image.keypoints, [&](const ColmapModel::Keypoint& keypoint) { return !isSeen(keypoint.point); });
-    left += image.keypoints.size();
+  countViews();
+  // The other photos of a blurred one, which are more exact, may not agree with most of its points.
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    const std::vector<ColmapModel::Keypoint>& keypoints = model.images[i].keypoints;
+    size_t left = 0;
+    for (size_t k = 0; k < keypoints.size(); ++k) left += agrees(i, k) && isSeen(keypoints[k].point) ? 1 : 0;
+    if (left >= kFewObservations && 2 * left >= keypoints.size()) continue;
+    for (const ColmapModel::Keypoint& keypoint : keypoints) needed.insert(keypoint.point);
+  }
+  countViews();
+  size_t removed = 0;
+  for (size_t i = 0; i < model.images.size(); ++i) {
+    std::vector<ColmapModel::Keypoint>& keypoints = model.images[i].keypoints;
+    std::vector<ColmapModel::Keypoint> agreeing;
+    for (size_t k = 0; k < keypoints.size(); ++k)
+      if (agrees(i, k) && isSeen(keypoints[k].point)) agreeing.push_back(keypoints[k]);
+    removed += keypoints.size() - agreeing.size();
+    keypoints = std::move(agreeing);
   }
   std::erase_if(model.points, [&](const ColmapModel::Point& point) { return !isSeen(point.id); });
-  return before - left;
+  return removed;
 }
 
 }  // namespace tessera

@@ -36,7 +36,7 @@ class SurveyModel {
       image.id = static_cast<uint32_t>(photo + 1);
       image.camera = 1;
       image.quaternion = {1, 0, 0, 0};
-      image.translation = {-photo, 0, 0};
+      image.translation = {-1.0 * photo, 0, 0};
       const double error = photo == kPhotos - 1 ? noiseOfLast : noise;
       for (const ColmapModel::Point& point : model.points) {
         const auto pixel = camera.pixelFromCamera(point.point.xInWorld - Vec3d(photo, 0, 0));
@@ -70,6 +70,25 @@ TEST(OutlyingObservations, AreKeptByAPhotoWithFewOthers) {
   ColmapModel model = SurveyModel(0.3, 0.3).model;
   model.images[2].keypoints.resize(29);  // the wrong match of point 20 among them
   EXPECT_EQ(removeOutlyingObservations(model), 0u);
+}
+
+// As at the end of a line: most points are those of two photos, of which one is blurred.
+TEST(OutlyingObservations, LeaveThePhotosOfABlurredOneWhatItNeeds) {
+  ColmapModel model = SurveyModel(0.3, 0.3).model;
+  ColmapModel::Image &sharp = model.images[6], &blurred = model.images[7];
+  for (size_t k = 0; k < kPoints; ++k) {
+    if (k < 100) {
+      // Triangulation has shared its error with the sharp photo.
+      sharp.keypoints[k].x += 3;
+      blurred.keypoints[k].x -= 3;
+    }
+  }
+  blurred.keypoints.resize(100);
+  for (ColmapModel::Image& image : model.images)
+    if (image.id <= 6) image.keypoints.erase(image.keypoints.begin(), image.keypoints.begin() + 100);
+  removeOutlyingObservations(model);
+  EXPECT_EQ(blurred.keypoints.size(), 100u);
+  EXPECT_EQ(sharp.keypoints.size(), kPoints);
 }
 
 TEST(OutlyingObservations, TakePointsWithThemThatOnePhotoIsLeftToShow) {

@@ -3,13 +3,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <mutex>
 #include <optional>
 
 #include "base/error.h"
 #include "base/file_digest.h"
 #include "base/image_io.h"
 #include "base/log.h"
-#include "import/colmap_model.h"
 #include "import/photo_files.h"
 
 namespace tessera {
@@ -64,9 +64,16 @@ std::string PhotoMasks::describe() const {
 }
 
 fs::path PhotoMasks::find(const std::string& name, const fs::path& photo) const {
-  const fs::path mask = findMask(folder_, name);
-  std::error_code status;
-  return !mask.empty() && fs::equivalent(mask, photo, status) ? fs::path() : mask;
+  // The folder is the user's own, so that links in it may lead anywhere; names may come from files.
+  const fs::path relative = fs::path(name).lexically_normal();
+  if (relative.is_absolute() || relative.empty() || *relative.begin() == "..") return {};
+  const std::string inner = relative.generic_string();
+  for (const fs::path& mask :
+       {folder_ / (inner + ".png"), folder_ / inner, (folder_ / inner).replace_extension(".png")}) {
+    std::error_code status;
+    if (fs::is_regular_file(mask, status)) return fs::equivalent(mask, photo, status) ? fs::path() : mask;
+  }
+  return {};
 }
 
 void PhotoMasks::report(size_t masks, const std::vector<std::string>& photos) const {
@@ -115,20 +122,29 @@ void PhotoMasks::addTo(SourceCapture& source) const {
   report(masks, names);
 }
 
-bool writeMasks(const PhotoList& list, const fs::path& folder) {
-  bool areThere = false;
-  std::vector<std::string> excluded;
-  for (const ListedPhoto& photo : list.photos) {
-    if (photo.mask.empty()) continue;
-    areThere = true;
+bool writeMasks(const PhotoList& list, const fs::path& folder, ThreadPool& pool, const std::function<void()>& look) {
+  std::vector<char> areThere(list.photos.size(), 0), areExcluded(list.photos.size(), 0);
+  std::mutex looking;
+  pool.run(list.photos.size(), [&](size_t i, int) {
+    const ListedPhoto& photo = list.photos[i];
+    if (photo.mask.empty()) return;
+    if (look) {
+      const std::lock_guard lock(looking);
+      look();
+    }
     const fs::path target = folder / (photo.safeName + ".png");
     std::error_code status;
-    const ImageU8 mask = toMask(readImage(photo.mask).image, false);
-    if (excludesAll(mask)) excluded.push_back(photo.name);
-    if (!fs::exists(target, status)) writePng(target, mask);
-  }
-  if (areThere) warnOfExcluded(excluded, list.photos.size(), "--masks");
-  return areThere;
+    const bool isWritten = fs::exists(target, status);
+    const ImageU8 mask = isWritten ? readImage(target).image : toMask(readImage(photo.mask).image, false);
+    if (!isWritten) writePng(target, mask);
+    areThere[i] = 1;
+    areExcluded[i] = excludesAll(mask) ? 1 : 0;
+  });
+  std::vector<std::string> excluded;
+  for (size_t i = 0; i < list.photos.size(); ++i)
+    if (areExcluded[i] != 0) excluded.push_back(list.photos[i].name);
+  if (!excluded.empty()) warnOfExcluded(excluded, list.photos.size(), "--masks");
+  return std::find(areThere.begin(), areThere.end(), 1) != areThere.end();
 }
 
 }  // namespace tessera

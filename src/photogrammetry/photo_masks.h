@@ -1,10 +1,12 @@
 // Masks that the user gives for photos: black where a photo is not to be used, for features and for training.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
 #include "base/file.h"
+#include "base/threads.h"
 #include "import/source.h"
 #include "photogrammetry/photo_list.h"
 
@@ -32,8 +34,10 @@ class PhotoMasks {
 };
 
 // Writes the masks of a list as COLMAP reads them, under the safe names of their photos: PNGs of one channel, 0 or 255.
-// Those that are there stay. Returns whether there are any. Warns of those that
-// exclude whole photos; throws Error if these are all photos, or if one cannot be decoded or written.
-bool writeMasks(const PhotoList& list, const fs::path& folder);
+// Those that are there stay. Returns whether there are any. `look` is called before each mask, by one thread at a time;
+// what it throws ends this. Warns of masks that exclude whole photos. Throws Error if these are all photos, or if a
+// mask cannot be decoded or written.
+bool writeMasks(const PhotoList& list, const fs::path& folder, ThreadPool& pool,
+                const std::function<void()>& look = {});
 
 }  // namespace tessera

@@ -60,6 +60,27 @@ TEST_F(PhotoMasksOf, AListAreDescribedByTheirContents) {
   EXPECT_NE(PhotoMasks(masks_).describe(), before);
 }
 
+// As in folders of links into a data set.
+TEST_F(PhotoMasksOf, AListMayBeLinks) {
+  writePng(folder_ / "elsewhere/mask.png", ImageU8(16, 12, 1, 255));
+  fs::create_directories(masks_ / "a");
+  fs::create_symlink(folder_ / "elsewhere/mask.png", masks_ / "a/one.png");
+  PhotoMasks(masks_).addTo(list_);
+  EXPECT_EQ(list_.photos[0].mask, masks_ / "a/one.png");
+  list_.photos[1].name = "../elsewhere/mask.jpg";
+  PhotoMasks(masks_).addTo(list_);
+  EXPECT_TRUE(list_.photos[1].mask.empty());
+}
+
+TEST_F(PhotoMasksOf, AListAreWrittenUntilTheWatchEndsIt) {
+  writeMask("a/one.png");
+  PhotoMasks(masks_).addTo(list_);
+  ThreadPool pool(2);
+  EXPECT_THROW(writeMasks(list_, folder_ / "poses/masks", pool, [] { throw std::runtime_error("interrupted"); }),
+               std::runtime_error);
+  EXPECT_FALSE(fs::exists(folder_ / "poses/masks/safe0.jpg.png"));
+}
+
 TEST_F(PhotoMasksOf, AListAreRefusedIfTheyDoNotFit) {
   EXPECT_TRUE(contains(failure(), "masks: is not a folder"));
   writeMask("other.png");
@@ -122,7 +143,8 @@ TEST_F(PhotoMasksOf, AListReachFeatures) {
 TEST_F(PhotoMasksOf, AListAreRefusedIfTheyExcludeEverything) {
   for (const char* name : {"a/one.png", "a/two.png", "b/three.png"}) writePng(masks_ / name, ImageU8(16, 12, 1, 1));
   PhotoMasks(masks_).addTo(list_);
-  const auto write = [this] { return errorMessage([this] { writeMasks(list_, folder_ / "poses/masks"); }); };
+  ThreadPool pool(2);
+  const auto write = [&] { return errorMessage([&] { writeMasks(list_, folder_ / "poses/masks", pool); }); };
   EXPECT_TRUE(contains(write(), "--masks: excludes all pixels of all photos")) << write();
   EXPECT_TRUE(contains(write(), "--masks: excludes all pixels of all photos")) << "masks that have been written";
   writeMask("b/three.png");

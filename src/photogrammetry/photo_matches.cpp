@@ -9,6 +9,7 @@
 #include "base/error.h"
 #include "base/image_io.h"
 #include "base/memory.h"
+#include "base/threads.h"
 #include "photogrammetry/colmap_database.h"
 #include "photogrammetry/look_alikes.h"
 #include "photogrammetry/photo_masks.h"
@@ -104,7 +105,8 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
                                        "0",
                                        "--SiftExtraction.num_threads",
                                        std::to_string(threads)};
-    if (writeMasks(list_, folder_ / "masks"))
+    ThreadPool pool(settings_.threads);
+    if (writeMasks(list_, folder_ / "masks", pool, [&] { watch(0); }))
       arguments.insert(arguments.end(), {"--ImageReader.mask_path", (folder_ / "masks").string()});
     runColmap(
         "features", std::move(arguments), [&] { watch(done()); }, [&] { return done() == count; });
@@ -150,14 +152,17 @@ LookAlikes PhotoMatches::findLookAlikes(const Watch& watch) {
 
 void PhotoMatches::match(const std::vector<PhotoPair>& pairs, const Watch& watch) {
   const fs::path list = folder_ / "pairs.txt";
-  const auto notCompared = [&] {
+  const std::map<int, int> features = ColmapDatabase(database()).features();
+  // Of some pairs, those that have not been compared. Photos without features cannot be.
+  const auto notCompared = [&](auto begin, auto end) {
     std::vector<PhotoPair> missing;
     const auto known = ColmapDatabase(database()).inliers();
-    std::copy_if(pairs.begin(), pairs.end(), std::back_inserter(missing),
-                 [&](const PhotoPair& pair) { return !known.contains(pair); });
+    std::copy_if(begin, end, std::back_inserter(missing), [&](const PhotoPair& pair) {
+      return !known.contains(pair) && features.contains(pair.first) && features.contains(pair.second);
+    });
     return missing;
   };
-  const std::vector<PhotoPair> missing = notCompared();
+  const std::vector<PhotoPair> missing = notCompared(pairs.begin(), pairs.end());
   for (size_t begin = 0; begin < missing.size(); begin += kPairsAtOnce) {
     std::string text;
     const size_t end = std::min(missing.size(), begin + kPairsAtOnce);
@@ -171,15 +176,15 @@ void PhotoMatches::match(const std::vector<PhotoPair>& pairs, const Watch& watch
         {"matches_importer", "--database_path", database().string(), "--match_list_path", list.string(), "--match_type",
          "pairs", "--SiftMatching.use_gpu", "0", "--SiftMatching.num_threads", settings_.threadsText()},
         [&] { watch(static_cast<int64_t>(pairs.size() - missing.size() + begin)); },
-        [&] { return notCompared().size() <= missing.size() - end; });
+        [&] {
+          const auto first = missing.begin();
+          return notCompared(first + static_cast<std::ptrdiff_t>(begin), first + static_cast<std::ptrdiff_t>(end))
+              .empty();
+        });
     watch(static_cast<int64_t>(pairs.size() - missing.size() + end));
   }
   // Whatever the program reported.
-  const std::map<int, int> features = ColmapDatabase(database()).features();
-  const std::vector<PhotoPair> left = notCompared();
-  const auto without = std::count_if(left.begin(), left.end(), [&](const PhotoPair& pair) {
-    return features.contains(pair.first) && features.contains(pair.second);
-  });
+  const size_t without = notCompared(pairs.begin(), pairs.end()).size();
   if (without > 0) {
     throw Error(database().string(), "",
                 fmt::format("lacks {} of {} pairs after they were compared", without, pairs.size()),

@@ -116,8 +116,13 @@ TEST(PhotoMatches, TakeAsManyThreadsAsMemoryAllows) {
 // Pair 0 and 2 is in the tables; the script adds another, and fails.
 TEST(PhotoMatches, AreDoneIfTheTablesSaySoWhateverTheProgramReports) {
   const TemporaryFolder folder;
-  makeDatabase(folder / "database.db");
-  makeDatabase(folder / "later.db");
+  for (const char* name : {"database.db", "later.db"}) {
+    makeDatabase(folder / name);
+    sqlite3* handle = nullptr;
+    ASSERT_EQ(sqlite3_open((folder / name).c_str(), &handle), SQLITE_OK);
+    sqlite3_exec(handle, "INSERT INTO keypoints VALUES(3, 500)", nullptr, nullptr, nullptr);
+    sqlite3_close(handle);
+  }
   addInliers(folder / "later.db", 1, 2, 60);
   const PhotoList list = numberedPhotos(3);
   const auto match = [&](const std::string& script) {

@@ -9,49 +9,8 @@
 #include "base/log.h"
 #include "import/colmap_model.h"
 #include "import/georeference.h"
-#include "photogrammetry/colmap_writer.h"
-#include "photogrammetry/outlying_observations.h"
 
 namespace tessera {
-namespace {
-
-constexpr size_t kPhotosForFullLens = 40;   // of a camera, from which on its principal point is adjusted
-constexpr double kFarthestCentre = 0.05;    // of the size of the picture, of a principal point from the middle
-constexpr const char* kAdjustments = "12";  // iterations at most; five to eight reach the tolerance
-constexpr const char* kTolerance = "1e-6";  // change of the cost in an iteration, relative to it, that ends them
-constexpr int kRefits = 2;                  // without outlying observations
-
-Camera withDecentring(Camera camera) {
-  if (camera.lens != LensModel::radial) return camera;
-  const auto [f, cx, cy, k1, k2] = std::tuple(camera.parameters[0], camera.parameters[1], camera.parameters[2],
-                                              camera.parameters[3], camera.parameters[4]);
-  camera.lens = LensModel::openCv;
-  camera.parameters = {f, f, cx, cy, k1, k2, 0, 0};
-  return camera;
-}
-
-// Whether no photo has been lost, and all lenses are likely but for those of a few photos, which may be any.
-bool isPlausible(const ColmapModel& model, const ColmapModel& before) {
-  if (model.images.size() != before.images.size()) return false;
-  constexpr size_t kFew = 20;  // one in so many
-  std::set<uint32_t> unlikely;
-  for (const auto& [id, camera] : model.cameras) {
-    const auto was = before.cameras.find(id);
-    if (was == before.cameras.end()) return false;
-    const double dx = (camera.centreX() - 0.5 * camera.width) / camera.width,
-                 dy = (camera.centreY() - 0.5 * camera.height) / camera.height;
-    const double oblong = camera.focalX() / camera.focalY();
-    const double longer = camera.focalX() / was->second.focalX();
-    if (!(std::abs(dx) < kFarthestCentre && std::abs(dy) < kFarthestCentre && oblong > 0.98 && oblong < 1.02 &&
-          longer > 0.8 && longer < 1.25))
-      unlikely.insert(id);
-  }
-  const auto concerned = std::count_if(model.images.begin(), model.images.end(),
-                                       [&](const auto& image) { return unlikely.contains(image.camera); });
-  return kFew * static_cast<size_t>(concerned) <= model.images.size();
-}
-
-}  // namespace
 
 PhotoModels::PhotoModels(fs::path folder, const PhotoList& list, ColmapSettings settings)
     : folder_(std::move(folder)), list_(list), settings_(std::move(settings)) {}
@@ -105,6 +64,7 @@ bool PhotoModels::agreesWithGps(const fs::path& joined, const fs::path& before) 
 }
 
 int PhotoModels::join(const Watch& watch) {
+  for (const char* name : {"sparse.continued", "sparse.whole"}) removeFolder(folder_ / name);  // `map` is finished
   const std::vector<Piece> pieces = piecesIn(folder_ / "sparse");
   if (pieces.size() < 2) return 0;
   const fs::path result = folder_ / "joined.partial", attempt = folder_ / "joined.attempt";
@@ -160,7 +120,7 @@ int PhotoModels::join(const Watch& watch) {
   runColmap(
       "joining",
       {"bundle_adjuster", "--input_path", points.string(), "--output_path", adjusted.string(),
-       "--BundleAdjustment.max_num_iterations", kAdjustments},
+       "--BundleAdjustment.max_num_iterations", kMaxAdjustments},
       [&] { watch(0); }, [&] { return !photosIn(adjusted).empty(); });
   if (photosIn(adjusted).size() != whole.photos.size()) {
     throw Error(adjusted.string(), "", "lacks photos of the models that were joined",
@@ -180,49 +140,6 @@ void PhotoModels::extend(bool resumes, const Watch& watch) {
     replaceFolder(partial, folder_ / "joined");
   }
   for (const char* name : {"extended.partial", "snapshots", "snapshot.begun"}) fs::remove_all(folder_ / name, status);
-}
-
-void PhotoModels::adjust(const Watch& watch) {
-  const fs::path input = last(false), partial = folder_ / "adjusted.partial";
-  const ColmapModel before = readColmapModel(input);
-  std::map<uint32_t, size_t> photosByCamera;
-  for (const ColmapModel::Image& image : before.images) ++photosByCamera[image.camera];
-  const bool allHaveMany = std::all_of(photosByCamera.begin(), photosByCamera.end(),
-                                       [](const auto& entry) { return entry.second >= kPhotosForFullLens; });
-  // Returns whether a plausible model results, which then is in `partial`.
-  const auto adjustTo = [&](const ColmapModel& model, bool fullLens) {
-    const fs::path begun = folder_ / "adjusted.begun", result = folder_ / "adjusted.result";
-    for (const fs::path& folder : {begun, result}) {
-      removeFolder(folder);
-      makeFolder(folder);
-    }
-    writeColmapModel(model, begun);
-    runColmap(
-        "adjusting",
-        {"bundle_adjuster", "--input_path", begun.string(), "--output_path", result.string(),
-         "--BundleAdjustment.max_num_iterations", kAdjustments, "--BundleAdjustment.function_tolerance", kTolerance,
-         "--BundleAdjustment.refine_principal_point", fullLens && allHaveMany ? "1" : "0"},
-        [&] { watch(static_cast<int64_t>(before.images.size())); }, [&] { return !photosIn(result).empty(); });
-    const bool isUsable = !photosIn(result).empty() && isPlausible(readColmapModel(result), before);
-    if (isUsable) replaceFolder(result, partial);
-    for (const fs::path& folder : {begun, result}) removeFolder(folder);
-    return isUsable;
-  };
-  ColmapModel withFullLens = before;
-  for (auto& [id, camera] : withFullLens.cameras)
-    if (photosByCamera[id] >= kPhotosForFullLens) camera = withDecentring(camera);
-  removeFolder(partial);
-  const bool fullLens = adjustTo(withFullLens, true);
-  if (fullLens || adjustTo(before, false)) {
-    for (int i = 0; i < kRefits; ++i) {
-      ColmapModel model = readColmapModel(partial);
-      if (removeOutlyingObservations(model) == 0 || !adjustTo(model, fullLens)) break;
-    }
-  } else {
-    warn("the final bundle adjustment gives no plausible lens; poses stay as they were estimated");
-    fs::copy(input, partial);
-  }
-  replaceFolder(partial, folder_ / "adjusted");
 }
 
 PhotoModels::Count PhotoModels::countMapped() const {

@@ -60,6 +60,10 @@ class PhotoModels {
 
  private:
   static constexpr size_t kLeastShared = 3;  // photos of models that model_merger joins
+  // Of bundle adjustment: iterations at most, of which surveys have needed five to eight, and the change of the cost,
+  // relative to it, that ends them.
+  static constexpr const char* kMaxAdjustments = "50";
+  static constexpr const char* kAdjustmentTolerance = "1e-6";
 
   fs::path last(bool adjusted) const;
   // What the mapper begins with: a model that it goes on from, or a pair of photos.

@@ -60,9 +60,13 @@ void thinSnapshots(const fs::path& folder) {
   for (size_t i = kKeptSnapshots; i < complete.size(); ++i) fs::remove_all(complete[i].second, status);
 }
 
-// Whether the mapper has written a model into a folder, or into a folder in it.
-bool holdsModel(const fs::path& folder) {
-  return !photosIn(folder).empty() || !piecesIn(folder).empty();
+// Whether the mapper has come to its end, which it says last, with a model in a folder, or in a folder in it. It writes
+// each model when that is finished.
+bool hasFinished(const fs::path& folder, const fs::path& log) {
+  const std::string text = readEnd(log);
+  const size_t end = text.rfind("Elapsed time");
+  return end != text.npos && text.find("Registering image", end) == text.npos &&
+         (!photosIn(folder).empty() || !piecesIn(folder).empty());
 }
 
 // Going on from a model, the mapper writes one model into the folder itself, not into 0. Moves it there; returns
@@ -108,12 +112,12 @@ void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool 
     thinSnapshots(snapshots);
     watch(lastRegistered(log));
   };
-  runColmap("mapping", std::move(arguments), look, [&] { return holdsModel(output); });
+  runColmap("mapping", std::move(arguments), look, [&] { return hasFinished(output, log); });
+  requireWhole(output);
 }
 
 void PhotoModels::map(bool resumes, const Watch& watch) {
-  // What the mapper has finished is kept until all is done: as `continued` if it went on from a snapshot, else as
-  // `whole`.
+  // What the mapper has finished is kept until `join`: as `continued` if it went on from a snapshot, else as `whole`.
   const fs::path partial = folder_ / "sparse.partial", continued = folder_ / "sparse.continued",
                  whole = folder_ / "sparse.whole";
   const auto discardFinished = [&] {
@@ -145,7 +149,6 @@ void PhotoModels::map(bool resumes, const Watch& watch) {
         "check that neighbouring photos overlap by more than half, are sharp, and were taken from different places");
   }
   replaceFolder(partial, folder_ / "sparse");
-  discardFinished();
   // What came of the models before.
   discardAdjusted();
   discardJoined();
@@ -258,7 +261,8 @@ std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<i
   }
   try {
     runColmap(
-        "mapping", std::move(arguments), [&] { watch(lastRegistered(log)); }, [&] { return holdsModel(rest); });
+        "mapping", std::move(arguments), [&] { watch(lastRegistered(log)); }, [&] { return hasFinished(rest, log); });
+    requireWhole(rest);
   } catch (const ColmapKilled&) {
     throw;
   } catch (const Error& error) {

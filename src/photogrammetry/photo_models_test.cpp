@@ -50,11 +50,37 @@ TEST_F(PhotoModelsTest, SayThatNoPhotosCouldBePlaced) {
 // A program may fail after its work, when it ends.
 TEST_F(PhotoModelsTest, CountThoughTheProgramReportsFailureAfterwards) {
   PhotoModels estimated = models("case $command in mapper) cp -r " + prepared("a", numbers(0, 20)) +
-                                 " $output_path/0;; bundle_adjuster) cp $input_path/* $output_path;; esac; exit 139");
+                                 " $output_path/0; echo 'Elapsed time: 1 [minutes]';; bundle_adjuster) cp "
+                                 "$input_path/* $output_path;; esac; exit 139");
   estimated.map(false, ignore);
   EXPECT_EQ(estimated.unplaced(), numbers(20, 50));
   estimated.adjust(ignore);
   EXPECT_EQ(estimated.unplaced(), numbers(20, 50));
+}
+
+// It writes each model when that is finished: others may have been lost.
+TEST_F(PhotoModelsTest, AreNotThoseOfAMapperThatFailedBeforeItsEnd) {
+  PhotoModels estimated =
+      models("cp -r " + prepared("a", numbers(0, 20)) + " $output_path/0; echo 'Registering image #30 (2)'; exit 139");
+  EXPECT_THROW(estimated.map(false, ignore), Error);
+  EXPECT_FALSE(fs::exists(folder_ / "poses/sparse"));
+}
+
+TEST_F(PhotoModelsTest, AreRefusedIfTheyWereNotWrittenToTheirEnd) {
+  const std::string whole = prepared("a", numbers(0, 20));
+  PhotoModels estimated =
+      models("cp -r " + whole + " $output_path/0; head -c 99 " + whole + "/points3D.bin > $output_path/0/points3D.bin");
+  const std::string message = errorMessage([&] { estimated.map(false, ignore); });
+  EXPECT_NE(message.find("sparse.partial/0: was not written to its end"), std::string::npos) << message;
+}
+
+TEST_F(PhotoModelsTest, StayAsTheyWereIfTheirAdjustmentFails) {
+  PhotoModels estimated = models("case $command in mapper) cp -r " + prepared("a", numbers(0, 12)) +
+                                 " $output_path/0;; bundle_adjuster) exit 1;; esac");
+  estimated.map(false, ignore);
+  estimated.adjust(ignore);
+  EXPECT_EQ(adjustedCamera().parameters[0], 640);
+  EXPECT_EQ(estimated.read().capture.photos.size(), 12u);
 }
 
 TEST_F(PhotoModelsTest, AreRefusedIfTheySeeHardlyAnyPoint) {

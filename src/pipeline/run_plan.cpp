@@ -42,6 +42,7 @@ PhotoList photosToProbe(const PhotoList& list) {
   chosen.bodies = list.bodies;
   chosen.photos.assign(begin, begin + static_cast<std::ptrdiff_t>(count));
   chosen.flights = list.flights;
+  for (ListedPhoto& photo : chosen.photos) photo.mask.clear();  // which say nothing about the others
   return chosen;
 }
 

@@ -279,15 +279,16 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
     }
     count();
     result.isFinished = true;
+    run["stages"].push_back(toJson(stage.name, result));
+    write(run, file);  // at once: what the others need takes time to tell
     RunPlan later;
     for (size_t k = i + 1; k < remaining.end; ++k) later.entries.push_back({stages[k].name, stages[k].needs(false)});
     const double left = later.total().seconds;
     if (stage.revealsNeeds) {
       later.entries.push_back({stage.name, {result.seconds, result.peakBytes, 0}});
       record(later.total());
+      write(run, file);
     }
-    run["stages"].push_back(toJson(stage.name, result));
-    write(run, file);
     say(fmt::format("{:<10} {}: {}{}\n", stage.name, describeClock(result.seconds), result.summary,
                     left > kLongSeconds ? fmt::format(" (about {} left)", describeDuration(left)) : ""));
   }

@@ -1,0 +1,127 @@
+// The final bundle adjustment of PhotoModels.
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <unordered_map>
+
+#include "base/error.h"
+#include "base/log.h"
+#include "import/colmap_model.h"
+#include "photogrammetry/colmap_writer.h"
+#include "photogrammetry/outlying_observations.h"
+#include "photogrammetry/photo_models.h"
+
+namespace tessera {
+namespace {
+
+constexpr size_t kPhotosForFullLens = 40;  // of a camera, from which on its principal point is adjusted
+constexpr double kFarthestCentre = 0.05;   // of the size of the picture, of a principal point from the middle
+constexpr int kRefits = 2;                 // without outlying observations
+
+Camera withDecentring(Camera camera) {
+  if (camera.lens != LensModel::radial) return camera;
+  const auto [f, cx, cy, k1, k2] = std::tuple(camera.parameters[0], camera.parameters[1], camera.parameters[2],
+                                              camera.parameters[3], camera.parameters[4]);
+  camera.lens = LensModel::openCv;
+  camera.parameters = {f, f, cx, cy, k1, k2, 0, 0};
+  return camera;
+}
+
+// Whether no photo of a model has been lost, and all its lenses are likely but for those of a few photos, which may be
+// any. `photosByCamera` and `before`: how many photos each camera had, and their lenses.
+bool isPlausible(const fs::path& folder, const std::map<uint32_t, size_t>& photosByCamera,
+                 const std::unordered_map<uint32_t, Camera>& before) {
+  if (photosIn(folder).empty()) return false;
+  const ColmapModel model = readColmapModel(folder);
+  size_t photos = 0;
+  for (const auto& [camera, count] : photosByCamera) photos += count;
+  if (model.images.size() != photos) return false;
+  constexpr size_t kFew = 20;  // one in so many
+  std::set<uint32_t> unlikely;
+  for (const auto& [id, camera] : model.cameras) {
+    const auto was = before.find(id);
+    if (was == before.end()) return false;
+    const double dx = (camera.centreX() - 0.5 * camera.width) / camera.width,
+                 dy = (camera.centreY() - 0.5 * camera.height) / camera.height;
+    const double oblong = camera.focalX() / camera.focalY();
+    const double longer = camera.focalX() / was->second.focalX();
+    if (!(std::abs(dx) < kFarthestCentre && std::abs(dy) < kFarthestCentre && oblong > 0.98 && oblong < 1.02 &&
+          longer > 0.8 && longer < 1.25))
+      unlikely.insert(id);
+  }
+  size_t concerned = 0;
+  for (const auto& [camera, count] : photosByCamera) concerned += unlikely.contains(camera) ? count : 0;
+  return kFew * concerned <= photos;
+}
+
+}  // namespace
+
+void PhotoModels::adjust(const Watch& watch) {
+  const fs::path input = last(false), partial = folder_ / "adjusted.partial";
+  // Whole models are held no longer than needed: COLMAP takes much memory meanwhile.
+  std::unordered_map<uint32_t, Camera> camerasBefore;
+  std::map<uint32_t, size_t> photosByCamera;
+  {
+    const ColmapModel before = readColmapModel(input);
+    camerasBefore = before.cameras;
+    for (const ColmapModel::Image& image : before.images) ++photosByCamera[image.camera];
+  }
+  const bool allHaveMany = std::all_of(photosByCamera.begin(), photosByCamera.end(),
+                                       [](const auto& entry) { return entry.second >= kPhotosForFullLens; });
+  // Returns whether a plausible model results from the one in `begun`; then it is in `partial`.
+  const fs::path begun = folder_ / "adjusted.begun", result = folder_ / "adjusted.result";
+  const auto adjustBegun = [&](bool fullLens) {
+    removeFolder(result);
+    makeFolder(result);
+    try {
+      runColmap(
+          "adjusting",
+          {"bundle_adjuster", "--input_path", begun.string(), "--output_path", result.string(),
+           "--BundleAdjustment.max_num_iterations", kMaxAdjustments, "--BundleAdjustment.function_tolerance",
+           kAdjustmentTolerance, "--BundleAdjustment.refine_principal_point", fullLens && allHaveMany ? "1" : "0"},
+          [&] { watch(static_cast<int64_t>(list_.photos.size())); }, [&] { return !photosIn(result).empty(); });
+    } catch (const ColmapKilled&) {
+      throw;
+    } catch (const Error& error) {
+      warn("a bundle adjustment is left out: {}", error.what());
+      return false;
+    }
+    requireWhole(result);
+    if (!isPlausible(result, photosByCamera, camerasBefore)) return false;
+    replaceFolder(result, partial);
+    return true;
+  };
+  const auto writeInput = [&](bool fullLens) {
+    ColmapModel model = readColmapModel(input);
+    for (auto& [id, camera] : model.cameras)
+      if (fullLens && photosByCamera[id] >= kPhotosForFullLens) camera = withDecentring(camera);
+    writeColmapModel(model, begun);
+  };
+  // Returns whether there are any.
+  const auto removeOutlying = [&] {
+    ColmapModel model = readColmapModel(partial);
+    if (removeOutlyingObservations(model) == 0) return false;
+    writeColmapModel(model, begun);
+    return true;
+  };
+  removeFolder(begun);
+  removeFolder(partial);
+  writeInput(true);
+  bool fullLens = true, isAdjusted = adjustBegun(true);
+  if (!isAdjusted) {
+    writeInput(false);
+    fullLens = false;
+    isAdjusted = adjustBegun(false);
+  }
+  if (isAdjusted) {
+    for (int i = 0; i < kRefits && removeOutlying() && adjustBegun(fullLens); ++i) {
+    }
+  } else {
+    warn("the final bundle adjustment gives no plausible lens; poses stay as they were estimated");
+    fs::copy(input, partial);
+  }
+  replaceFolder(partial, folder_ / "adjusted");
+  for (const fs::path& folder : {begun, result}) removeFolder(folder);
+}
+
+}  // namespace tessera
