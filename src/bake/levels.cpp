@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include "tiles/content.h"
-
 namespace tessera {
 namespace {
 
@@ -26,11 +24,11 @@ Steps stepsOfLevel(uint32_t columns, uint32_t rows, uint32_t level) {
 
 }  // namespace
 
-uint32_t topLevel(uint32_t columns, uint32_t rows) {
+uint32_t topLevel(uint32_t columns, uint32_t rows, uint32_t maxBlocks) {
   for (uint32_t level = 0;; ++level) {
     const Steps steps = stepsOfLevel(columns, rows, level), next = stepsOfLevel(columns, rows, level + 1);
     if (groupsAlong(columns, steps.x) * groupsAlong(rows, steps.y) == 1) return level;
-    if (next.x * next.y > ContentLimits().parts) return level;
+    if (next.x * next.y > maxBlocks) return level;
   }
 }
 

@@ -12,9 +12,9 @@ namespace tessera {
 // kMaxMerged remain: 24 blocks become 6 and then 1, as in the paper.
 inline constexpr uint32_t kMaxMerged = 8;
 
-// Returns the level at which all blocks are merged into one; 0 for a single block. If one tile cannot hold that many
-// blocks (ContentLimits::parts), returns the highest level whose tiles can.
-uint32_t topLevel(uint32_t columns, uint32_t rows);
+// Returns the level at which all blocks are merged into one; 0 for a single block. If that would be more than
+// `maxBlocks`, returns the highest level whose groups have at most so many.
+uint32_t topLevel(uint32_t columns, uint32_t rows, uint32_t maxBlocks);
 
 struct LevelGroups {
   // [blocks]: the background block, which is the last block, always forms the last group on its own.

@@ -66,7 +66,7 @@ describe('the view of a camera', () => {
       const holds = (tile: number) => resident.includes(tile);
       const view = makeView(camera);
       const choice = selector.choose(view, {
-        budget, holds, estimateBytes: (tile) => golden.bytes[tile], canBeHad: () => true, tileResources: () => [], bytesOfResource: () => 0,
+        budget, holds, estimateBytes: (tile) => golden.bytes[tile], canBeHad: () => true, hasFailed: () => false, tileResources: () => [], bytesOfResource: () => 0,
       });
       const drawn = selector.cut(view, holds);
       expect({ i, ...choice }).toEqual({ i, requested, refused });
@@ -83,6 +83,7 @@ describe('the view of a camera', () => {
         holds: (tile) => resident.includes(tile),
         estimateBytes: (tile) => golden.bytes[tile],
         canBeHad: () => true,
+        hasFailed: () => false,
         tileResources: (tile) => golden.resources[tile],
         bytesOfResource: (id) => golden.bytesOfResources[id],
       });

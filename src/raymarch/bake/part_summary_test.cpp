@@ -14,6 +14,7 @@ TEST(PartSummary, CoversAllPartsAndReportsTheEdgeOfATexel) {
   content.parts[0].high = {0, 1, 0.5f};
   content.parts[1].low = {0, -1, -0.5f};
   content.parts[1].high = {2, 3, 1};
+  for (HashPart& part : content.parts) part.contracted = false;
   const ContentSummary summary = partSummary(content, 64);
   EXPECT_EQ(summary.box.low, Vec3d(-2, -1, -1));
   EXPECT_EQ(summary.box.high, Vec3d(2, 3, 1));
@@ -33,6 +34,20 @@ TEST(PartSummary, ReportsTheEdgeOfABackgroundsSmallestTexel) {
   EXPECT_TRUE(summary.isBackground);
   EXPECT_EQ(summary.geometricError, 2 * 4.0 / 32);
   EXPECT_EQ(summary.memoryBytes, bytesInMemory(content));
+}
+
+// Of blocks at the border that also show what lies outside of the grid.
+TEST(PartSummary, ReportsTheEdgeOfATexelOfTheCoarsestPart) {
+  HashContent content = tiles_test::testHashContent(3, 2);
+  for (HashPart& part : content.parts) {
+    part.backgroundBlock = false;
+    part.scale = {1, 1, 1};
+  }
+  content.parts[0].contracted = false;
+  content.parts[1].contracted = true;
+  const ContentSummary summary = partSummary(content, 64);
+  EXPECT_FALSE(summary.isBackground);
+  EXPECT_EQ(summary.geometricError, 4.0 / 64);
 }
 
 }  // namespace

@@ -30,12 +30,12 @@ export class PartReader extends ContentReader {
   // Returns the layout if the GPU supports it and the vectors for its shaders.
   protected laidOut<Layout extends { bytes: number }>(layout: Layout | undefined, uniformBytes: number): Layout {
     if (uniformBytes > this.limits.uniformBytes) {
-      this.fail('has more parts, or a larger network, than this GPU takes', 'draw it on another machine');
+      this.refuse('has more parts, or a larger network, than this GPU takes', 'draw it on another machine');
     }
     if (!layout) {
-      this.fail('is more than this GPU takes in one texture', 'draw a coarser level, or bake smaller blocks');
+      this.refuse('is more than this GPU takes in one texture', 'draw a coarser level, or bake smaller blocks');
     }
-    if (layout.bytes > this.limits.bytes) this.fail(`takes more than ${this.limits.bytes} bytes of memory`);
+    if (layout.bytes > this.limits.bytes) this.refuse(`takes more than ${this.limits.bytes} bytes of memory`, 'bake smaller blocks');
     return layout;
   }
 

@@ -23,7 +23,7 @@ const high = testView([0, 0, 40], 0, -1.5);
 const low = testView([-3.5, -3.5, 1], 0.8, -0.4);
 
 const everything = {
-  budget: Infinity, holds: () => false, estimateBytes: () => 1, canBeHad: () => true, tileResources: (): number[] => [], bytesOfResource: () => 0,
+  budget: Infinity, holds: () => false, estimateBytes: () => 1, canBeHad: () => true, hasFailed: () => false, tileResources: (): number[] => [], bytesOfResource: () => 0,
 };
 
 describe('a selection', () => {

@@ -25,6 +25,7 @@ export interface TileMemory {
   holds(tile: number): boolean;
   estimateBytes(tile: number): number; // GPU bytes of a tile as far as known, without the resources that it shares with others
   canBeHad(tile: number): boolean;
+  hasFailed(tile: number): boolean; // since it was last loaded
   tileResources(tile: number): readonly number[]; // resources that the tile shares with others and cannot be drawn without
   bytesOfResource(id: number): number; // like estimateBytes; counted once, for the first tile that needs it
 }
@@ -96,7 +97,8 @@ export class TileSelector {
     for (const tile of this.pinned) {
       const node = this.tree.tiles[tile];
       request(tile);
-      if (view.sees(node) && this.isReplaced(view, tile)) addBelow(tile, node);
+      // Finer tiles stand in for one that cannot be loaded, however far it is.
+      if (view.sees(node) && (this.isReplaced(view, tile) || memory.hasFailed(tile))) addBelow(tile, node);
     }
     const requested: number[] = [];
     let refused = 0;

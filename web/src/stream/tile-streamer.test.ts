@@ -12,6 +12,7 @@ class FakeSource implements TileSource<number, number, { tile: number; slices: n
   fetches: number[] = [];
   aborted = 0;
   broken = new Set<number>(); // tiles that cannot be fetched
+  tooLarge = new Set<number>(); // tiles that no GPU can take
   latency = () => 1; // turns of the event loop
   constructor(private readonly bytes: (tile: number) => number) {}
 
@@ -28,6 +29,7 @@ class FakeSource implements TileSource<number, number, { tile: number; slices: n
       }
     }
     if (this.broken.has(tile)) throw new SceneError(`tiles/${tile}.glb`, '', 'was not found', 'copy the scene again');
+    if (this.tooLarge.has(tile)) throw new SceneError(`tiles/${tile}.glb`, '', 'is too large', 'bake smaller blocks', true);
     return { file: tile, fileBytes: this.bytes(tile) / 4, gpuBytes: this.bytes(tile) };
   }
   async decode(_tile: number, file: number) {
@@ -164,13 +166,14 @@ describe('a tile streamer', () => {
     const errors: SceneError[] = [];
     setup.streamer.onError = (error) => errors.push(error);
     setup.source.broken.add(0);
+    const attempts = () => setup.source.fetches.filter((tile) => tile === 0).length;
     await settle(setup, far, 5);
-    expect(setup.source.fetches).toEqual([0]);
+    expect(attempts()).toBe(1);
     for (const [wait, expected] of [[1000, 2], [1900, 2], [200, 3], [4000, 4], [3000, 4], [1100, 5]]) {
       setup.clock.now += wait;
       setup.streamer.update(far);
       await turns(10);
-      expect(setup.source.fetches.length).toBe(expected);
+      expect(attempts()).toBe(expected);
     }
     expect(errors).toHaveLength(1);
     setup.source.broken.clear();
@@ -195,6 +198,30 @@ describe('a tile streamer', () => {
     await settle(setup, near);
     expect(setup.streamer.findResident(coarse)).toBeDefined();
     expect(setup.streamer.tileError(coarse)).toBeUndefined();
+  });
+
+  it('draws finer tiles in place of the coarsest one if that fails, however far it is', async () => {
+    const tree = testTree(4);
+    const setup = make(tree, 1e6);
+    setup.source.broken.add(0);
+    const cut = await settle(setup, far);
+    const below = tree.tiles[0].children.filter((one) => far.sees(tree.tiles[one]));
+    expect(below.length).toBeGreaterThan(0);
+    for (const one of below) expect(cut.find(({ tile }) => tile === one)).toEqual({ tile: one, content: one, visible: true });
+    expect(setup.streamer.idle).toBe(true);
+    setup.source.broken.clear();
+    setup.clock.now += 60000;
+    expect(await settle(setup, far)).toEqual([{ tile: 0, content: 0, visible: true }]);
+  });
+
+  it('does not fetch again what the GPU cannot take', async () => {
+    const setup = make(testTree(2), 1000);
+    setup.source.tooLarge.add(0);
+    await settle(setup, far, 5);
+    setup.clock.now += 1e7;
+    await settle(setup, far, 5);
+    expect(setup.source.fetches.filter((tile) => tile === 0)).toEqual([0]);
+    expect(setup.streamer.idle).toBe(true);
   });
 
   it('evicts at once when the budget becomes smaller', async () => {

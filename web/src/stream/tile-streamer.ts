@@ -132,6 +132,7 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
       holds: (tile) => this.entry(tile).reserved,
       estimateBytes: (tile) => this.estimateBytes(tile),
       canBeHad: (tile) => this.canBeHad(tile, now),
+      hasFailed: (tile) => this.tileError(tile) !== undefined,
       tileResources: (tile) => this.shared.of(tile),
       bytesOfResource: (id) => this.shared.estimateBytes(id),
     });
@@ -142,8 +143,9 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
     else this.toldOfBudget = false;
     const missing = isTooMuch ? [] : this.selector.pinned.filter((tile) => !this.findResident(tile) && this.canBeHad(tile, now));
     this.load(this.complete ? [...missing, ...requested] : missing, now);
-    // Pinned tiles count as resident even if some are missing: what is drawn of the others is correct all the same.
-    const { tiles, backgroundBlock } = this.selector.cut(view, (tile) => this.entry(tile).pinned || this.findResident(tile) !== undefined);
+    // Pinned tiles count as resident while some are loaded: what is drawn of the others is correct all the same.
+    const { tiles, backgroundBlock } = this.selector.cut(view, (tile) =>
+      this.findResident(tile) !== undefined || (this.entry(tile).pinned && this.tileError(tile) === undefined));
     const drawn = tiles.map((one) => ({ ...one, visible: one.visible && this.findResident(one.content) !== undefined }));
     for (const { content, visible } of drawn) if (visible) this.entry(content).lastUsed = this.frame;
     if (backgroundBlock >= 0) this.entry(backgroundBlock).lastUsed = this.frame;
@@ -391,7 +393,7 @@ export class TileStreamer<Fetched, Decoded, Resident, Resource = unknown> {
   private fail(tile: number, entry: Entry<Fetched, Resident>, error: unknown): void {
     const { firstRetry, lastRetry } = this.settings;
     entry.error = error instanceof SceneError ? error : new SceneError(`tile ${tile}`, '', String(error), 'reload the page');
-    entry.retryAt = this.now() + Math.min(lastRetry, firstRetry * 2 ** entry.failures);
+    entry.retryAt = entry.error.isFinal ? Infinity : this.now() + Math.min(lastRetry, firstRetry * 2 ** entry.failures);
     if (entry.failures++ === 0) this.onError(entry.error, tile);
     ++this.statistics.failures;
   }

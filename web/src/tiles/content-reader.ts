@@ -34,6 +34,10 @@ export class ContentReader {
     throw new SceneError(this.name, '', reason, remedy);
   }
 
+  protected refuse(reason: string, remedy: string): never {
+    throw new SceneError(this.name, '', reason, remedy, true);
+  }
+
   protected readFile(file: Uint8Array, representation: string): ContentFile {
     if (file.length > this.limits.fileBytes) this.fail('is larger than any content should be');
     const glb = decodeGlb(file) ?? this.fail('is not a binary glTF 2.0 file, or is cut short');

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "base/error.h"
 #include "compute/block_path.h"
@@ -84,10 +85,12 @@ class VisibilityMarker final : public PixelVisitor {
   ImageRays imageRays_;
 };
 
-// Returns the smallest range that contains all values.
+// Returns the smallest range that contains all values; one of values that are not numbers if one is not finite.
 ByteRange findValueRange(const std::vector<float>& values, size_t first, size_t stride) {
   ByteRange range{0, 0};
   for (size_t i = first; i < values.size(); i += stride) {
+    constexpr float kNotANumber = std::numeric_limits<float>::quiet_NaN();
+    if (!std::isfinite(values[i])) return {kNotANumber, kNotANumber};
     range.low = i == first ? values[i] : std::min(range.low, values[i]);
     range.high = i == first ? values[i] : std::max(range.high, values[i]);
   }

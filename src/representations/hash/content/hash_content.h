@@ -2,6 +2,7 @@
 // coarser level of detail, and the network that turns the features composited along a ray into a colour.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <optional>
@@ -27,8 +28,8 @@ struct ByteRange {
   float scale() const { return (high - low) / 255; }
   float decodeByte(uint8_t byte) const { return low + scale() * static_cast<float>(byte); }
   uint8_t encodeByte(float value) const {  // the nearest byte, clamped to the range
-    const float byte = high > low ? (value - low) / scale() + 0.5f : 0.0f;
-    return static_cast<uint8_t>(byte < 0 ? 0 : byte > 255 ? 255 : byte);
+    const float byte = scale() > 0 ? (value - low) / scale() + 0.5f : 0.0f;
+    return static_cast<uint8_t>(byte >= 0 ? std::min(byte, 255.0f) : 0.0f);  // 0 for what is not a number
   }
 };
 

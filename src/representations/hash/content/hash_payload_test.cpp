@@ -59,6 +59,18 @@ std::optional<HashContent> roundTrip(const HashContent& content) {
   return again;
 }
 
+TEST(ByteRange, EncodesWhatItCannotHoldAtItsEnds) {
+  const ByteRange range{-1, 1};
+  EXPECT_EQ(range.encodeByte(-1), 0);
+  EXPECT_EQ(range.encodeByte(1), 255);
+  EXPECT_EQ(range.encodeByte(-3), 0);
+  EXPECT_EQ(range.encodeByte(3), 255);
+  EXPECT_EQ(range.encodeByte(std::numeric_limits<float>::infinity()), 255);
+  EXPECT_EQ(range.encodeByte(std::numeric_limits<float>::quiet_NaN()), 0);
+  EXPECT_EQ((ByteRange{2, 2}.encodeByte(2)), 0);
+  EXPECT_EQ((ByteRange{0, std::numeric_limits<float>::denorm_min()}.encodeByte(0)), 0);
+}
+
 TEST(HashPayload, GivesBackWhatWasWritten) {
   uint64_t seed = 0;
   for (const LevelWeights weights : {LevelWeights::none, LevelWeights::shared, LevelWeights::separate}) {

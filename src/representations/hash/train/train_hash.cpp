@@ -37,6 +37,13 @@ HashConfig levelConfig(HashConfig finest, uint32_t level, int64_t finestStep) {
 
 namespace {
 
+// Returns the coarsest level. A content of more blocks could not be drawn in most browsers: a uniform block of 64 KiB
+// holds 215 parts with one table each.
+uint32_t topHashLevel(uint32_t columns, uint32_t rows) {
+  constexpr uint32_t kMaxBlocks = 128;
+  return topLevel(columns, rows, kMaxBlocks);
+}
+
 // Throws Error, before anything is trained, if a level could not be baked because of its step length.
 void requireStepsOfScenes(const HashConfig& config) {
   const double longest = config.longestStep(), shortest = config.minRayStepRatio * longest;
@@ -68,7 +75,7 @@ class HashMethod final : public BlockMethod {
   }
   double lodStepFraction() const override { return finest_.lodStepFraction; }
   uint32_t topLevel(const BlockGrid& grid) const override {
-    return tessera::topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
+    return topHashLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
   }
   void open(const BlockRun& run, uint32_t top) override {
     finest_.photoBudgetMiB = run.photoBudgetMiB;
@@ -120,7 +127,7 @@ void HashMethod::reportMemory(const BlockTraining& on) const {
 }  // namespace
 
 BlockDemand hashBlockDemand(const HashConfig& config, const BlockRunOptions& options) {
-  return {makeBlockLimits(config, options), config.lodStepFraction, topLevel};
+  return {makeBlockLimits(config, options), config.lodStepFraction, topHashLevel};
 }
 
 TrainingResult trainHash(Device& device, const Capture& capture, const fs::path& model, TrainHashOptions options) {

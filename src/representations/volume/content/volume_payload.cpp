@@ -49,8 +49,8 @@ class VolumeWriter : ContentWriter {
 
 Bytes encodeVolume(const VolumeContent& content, int effort) {
   const ContentLimits limits;
-  uint64_t bytes = 0;
-  for (const VolumePart& part : content.parts) bytes += texelBytes(part, part.storedMacroblocks());
+  uint64_t bytes = sizeof(VolumeContent) + bytesInMemory(content.network);  // as readers count them
+  for (const VolumePart& part : content.parts) bytes += sizeof(VolumePart) + texelBytes(part, part.storedMacroblocks());
   requireContentWithin(limits, content.parts.size(), bytes, kRemedy);
   // Any other broken rule is a bug of this program.
   const auto broken = validationError(content);

@@ -12,6 +12,13 @@
 namespace tessera {
 namespace {
 
+// Returns the coarsest level. A content of more blocks could not be drawn in most browsers: a uniform block of 64 KiB
+// holds 645 parts, and 2048 layers of a texture the planes of 682.
+uint32_t topVolumeLevel(uint32_t columns, uint32_t rows) {
+  constexpr uint32_t kMaxBlocks = 512;
+  return topLevel(columns, rows, kMaxBlocks);
+}
+
 constexpr double kMiB = 1048576;
 constexpr double kWarnFraction = 0.02;  // of the pixels are excluded from training
 constexpr const char* kWaiting = "waiting";
@@ -67,7 +74,7 @@ class VolumeMethod final : public BlockMethod {
   }
   double lodStepFraction() const override { return finest_.lodStepFraction; }
   uint32_t topLevel(const BlockGrid& grid) const override {
-    return tessera::topLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
+    return topVolumeLevel(static_cast<uint32_t>(grid.columns), static_cast<uint32_t>(grid.rows));
   }
   void open(const BlockRun& run, uint32_t) override { finest_.photoBudgetMiB = run.photoBudgetMiB; }
   bool findSettings(const BlockTraining&, const BlockRun&, TrainingLoopOptions&,
@@ -145,7 +152,7 @@ void VolumeMethod::setPlannedSteps(int64_t steps) const {
 }  // namespace
 
 BlockDemand volumeBlockDemand(const VolumeConfig& config, const BlockRunOptions& options) {
-  return {makeBlockLimits(config, options), config.lodStepFraction, topLevel};
+  return {makeBlockLimits(config, options), config.lodStepFraction, topVolumeLevel};
 }
 
 TrainingResult trainVolume(Device& device, const Capture& capture, const fs::path& model, TrainVolumeOptions options) {

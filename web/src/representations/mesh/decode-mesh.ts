@@ -65,10 +65,10 @@ class MeshReader extends ContentReader {
     const parts = sources.map((source, n) => {
       const part = this.readPart(source, n, views);
       if (Math.max(...textureSize(part), 6 * skyEdge) > this.limits.edge2D) {
-        this.fail('is more than this GPU takes in one texture', 'draw it on another machine');
+        this.refuse('is more than this GPU takes in one texture', 'draw it on another machine');
       }
       memoryBytes += bytesOfPart(part, isCompressed);
-      if (memoryBytes > this.limits.bytes) this.fail(`takes more than ${this.limits.bytes} bytes of memory`);
+      if (memoryBytes > this.limits.bytes) this.refuse(`takes more than ${this.limits.bytes} bytes of memory`, 'bake smaller blocks');
       return part;
     });
     const vectors = parts.reduce((sum, { network }) => sum + networkVectors(network), 0);
