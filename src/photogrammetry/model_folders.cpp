@@ -49,7 +49,11 @@ uint64_t statedPhotos(const fs::path& folder) {
 
 void requireWhole(const fs::path& folder) {
   const auto check = [](const fs::path& model) {
-    if (statedCount(model / "images.bin") == 0 || !photosIn(model).empty()) return;
+    std::error_code status;
+    if (statedCount(model / "images.bin") == 0) return;
+    // A model may have no points at all, as of a camera that only turns.
+    const bool hasCount = fs::file_size(model / "points3D.bin", status) >= sizeof(uint64_t) && !status;
+    if (hasCount && (statedCount(model / "points3D.bin") == 0 || !photosIn(model).empty())) return;
     throw ColmapKilled(model.string(), "", "was not written to its end",
                        "check free space and quota of the disk, and run again to go on");
   };

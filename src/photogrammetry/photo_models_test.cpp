@@ -74,6 +74,13 @@ TEST_F(PhotoModelsTest, AreRefusedIfTheyWereNotWrittenToTheirEnd) {
   EXPECT_NE(message.find("sparse.partial/0: was not written to its end"), std::string::npos) << message;
 }
 
+TEST_F(PhotoModelsTest, MayHaveNoPointsAtAll) {
+  writeModel(folder_ / "none", numbers(0, 5), {}, 0);
+  PhotoModels estimated = models("cp -r " + (folder_ / "none").string() + " $output_path/0");
+  const std::string message = errorMessage([&] { estimated.map(false, ignore); });
+  EXPECT_NE(message.find("no two photos could be placed"), std::string::npos) << message;
+}
+
 TEST_F(PhotoModelsTest, StayAsTheyWereIfTheirAdjustmentFails) {
   PhotoModels estimated = models("case $command in mapper) cp -r " + prepared("a", numbers(0, 12)) +
                                  " $output_path/0;; bundle_adjuster) exit 1;; esac");

@@ -140,7 +140,7 @@ describe.skipIf(missing())('the viewer', () => {
     });
   });
 
-  it('recovers from a lost WebGL context', async () => {
+  it('recovers from a lost WebGL context, with half of the memory', async () => {
     await open(goldenScene, async (page, said) => {
       await page.waitForSelector('.loading.done', { state: 'attached' });
       const before = await countColours(page);
@@ -154,6 +154,9 @@ describe.skipIf(missing())('the viewer', () => {
         await restored;
       });
       await expect.poll(() => countColours(page), { timeout: 20000 }).toBeGreaterThan(0.9 * before);
+      await page.keyboard.press('c');
+      const memory = page.locator('label', { hasText: 'Graphics memory' }).locator('output');
+      expect(await memory.textContent()).toBe('256 MiB');
       expect(said).toEqual([]);
     });
   });

@@ -22,6 +22,9 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
     camera.fov = x;
     camera.updateProjectionMatrix();
   }));
+  const mebibytes = (x: number) => `${Math.round(2 ** x)} MiB`;
+  const memory = slider('Graphics memory', 6, 13, Math.log2(viewer.gpuBytes / 2 ** 20), 0.5, mebibytes,
+    changed((x) => (viewer.gpuBytes = 2 ** x * 2 ** 20)));
   const panel = element(
     'div', '',
     choice('Show', modes.map((mode): [string, ShownMode<DisplayMode>] => [mode.label, mode]),
@@ -36,14 +39,15 @@ export function addSettings(viewer: Viewer, toolbar: Toolbar): void {
     choice('Outside the captured region', [['Fades into haze', city.visibility], ['Is shown in full', Infinity]],
       changed((visibility) => (city.visibility = visibility))),
     choice('Pixels', kResolutions, changed((share) => (resolution.fixed = share))),
-    slider('Graphics memory', 6, 13, Math.log2(city.stream.gpuBytes / 2 ** 20), 0.5, (x) => `${Math.round(2 ** x)} MiB`,
-      changed((x) => (viewer.gpuBytes = 2 ** x * 2 ** 20))),
+    memory,
     lens,
   );
-  // Addresses and bookmarks set the lens, too.
+  // Addresses and bookmarks set the lens, too, and lost GPUs the memory.
   const opened = () => {
     lens.querySelector('input')!.valueAsNumber = camera.fov;
     lens.querySelector('output')!.textContent = `${Math.round(camera.fov)}°`;
+    memory.querySelector('input')!.valueAsNumber = Math.log2(viewer.gpuBytes / 2 ** 20);
+    memory.querySelector('output')!.textContent = mebibytes(Math.log2(viewer.gpuBytes / 2 ** 20));
   };
   toolbar.add({ name: 'Settings', key: 'c', icon: 'sliders', panel, opened });
 }

@@ -22,6 +22,8 @@ export interface Mover {
   update(seconds: number): boolean; // called once a frame; returns true if the camera has moved
 }
 
+const kLeastBudget = 64 * 2 ** 20; // bytes
+
 const kVisibility = 1; // as a multiple of the diagonal of the captured region
 
 export class Viewer {
@@ -56,6 +58,7 @@ export class Viewer {
     this.navigation = new Navigation(this.camera, canvas, city.bounds, (event) => this.pickAt(event));
     this.mover = this.navigation;
     addEventListener('resize', () => this.resize());
+    canvas.addEventListener('webglcontextlost', () => this.saveMemory());
     this.resize();
     this.navigation.showAll();
     this.watchClicks();
@@ -119,9 +122,18 @@ export class Viewer {
   }
 
   // GPU budget of all scenes together.
+  get gpuBytes(): number {
+    return this.gpuBudget;
+  }
   set gpuBytes(bytes: number) {
     this.gpuBudget = bytes;
     this.needPicture();
+  }
+
+  // A browser that takes the GPU away from a visible page is likely to lack memory for what this page draws, and would
+  // take it away again. Hidden pages lose it for many reasons.
+  private saveMemory(): void {
+    if (document.visibilityState === 'visible') this.gpuBytes = Math.min(this.gpuBudget, Math.max(kLeastBudget, this.gpuBudget / 2));
   }
 
   private get visibleScenes(): TesseraScene[] {
