@@ -75,11 +75,14 @@ fs::path findImages(const fs::path& source, const fs::path& model) {
 
 }  // namespace
 
+std::array<std::string, 3> maskNames(const std::string& name) {
+  return {name + ".png", name, fs::path(name).replace_extension(".png").generic_string()};
+}
+
 fs::path findMask(const fs::path& maskFolder, const std::string& name) {
   std::error_code status;
   if (!fs::is_directory(maskFolder, status)) return {};
-  for (const std::string& candidate :
-       {name + ".png", name, fs::path(name).replace_extension(".png").generic_string()}) {
+  for (const std::string& candidate : maskNames(name)) {
     const auto path = resolveInside(maskFolder, candidate);
     if (path && fs::is_regular_file(*path, status)) return *path;
   }

@@ -2,6 +2,7 @@
 // Source: COLMAP's documentation of its output format (cameras, images, points3D) and its camera models.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <span>
@@ -61,8 +62,10 @@ bool isColmapLens(std::string_view model);       // whether colmapCamera support
 // implausibly far away, or whose name leaves the folder, with a warning. `maskFolder`: that of findMask; empty: none.
 SourceCapture captureFromColmap(const ColmapModel& model, const fs::path& imageFolder, const fs::path& maskFolder = {});
 
-// Returns the mask of the photo a/b.jpg in a folder of masks: a/b.jpg.png (COLMAP's convention), a/b.jpg or a/b.png;
-// an empty path if there is none.
+// Returns the names that the mask of the photo a/b.jpg may have in a folder of masks: a/b.jpg.png (COLMAP's
+// convention), a/b.jpg and a/b.png.
+std::array<std::string, 3> maskNames(const std::string& name);
+// Returns the mask of a photo in a folder of masks, which must lie inside the folder; an empty path if there is none.
 fs::path findMask(const fs::path& maskFolder, const std::string& name);
 
 // Returns the folder of the sparse model in a source folder (sparse/0, sparse, colmap/sparse/0, or the folder itself;

@@ -159,7 +159,7 @@ void runMaskCommand(SourceCapture& source, const std::vector<fs::path>& targets,
   std::vector<Photo>& photos = source.capture.photos;
   Progress progress("masks", static_cast<int64_t>(photos.size()), "photos");
   constexpr size_t kFirst = 20;  // photos, after which it is likely that all masks will exclude everything
-  size_t excluded = 0;
+  size_t masks = 0, excluded = 0;
   for (size_t i = 0; i < photos.size(); ++i) {
     if (outcomes.photos[i] != FileOutcome::ready) continue;
     const ImageInfo image = probeImageFile(photos[i].image);
@@ -172,8 +172,8 @@ void runMaskCommand(SourceCapture& source, const std::vector<fs::path>& targets,
       command.makeMask(photos[i].image, targets[i], other.value_or(ImageU8()));
     }
     photos[i].mask = targets[i];
-    if (i < kFirst) excluded += excludesAll(readImage(targets[i]).image) ? 1 : 0;
-    if (i + 1 == kFirst && excluded == kFirst)
+    if (masks++ < kFirst) excluded += excludesAll(readImage(targets[i]).image) ? 1 : 0;
+    if (masks == kFirst && excluded == kFirst)
       warn("the masks of the first {} photos exclude all their pixels: white is what is used", kFirst);
     progress.update(static_cast<int64_t>(i) + 1);
   }

@@ -10,6 +10,7 @@
 #include "base/file_digest.h"
 #include "base/image_io.h"
 #include "base/log.h"
+#include "import/colmap_model.h"
 #include "import/photo_files.h"
 
 namespace tessera {
@@ -67,9 +68,8 @@ fs::path PhotoMasks::find(const std::string& name, const fs::path& photo) const 
   // The folder is the user's own, so that links in it may lead anywhere; names may come from files.
   const fs::path relative = fs::path(name).lexically_normal();
   if (relative.is_absolute() || relative.empty() || *relative.begin() == "..") return {};
-  const std::string inner = relative.generic_string();
-  for (const fs::path& mask :
-       {folder_ / (inner + ".png"), folder_ / inner, (folder_ / inner).replace_extension(".png")}) {
+  for (const std::string& candidate : maskNames(relative.generic_string())) {
+    const fs::path mask = folder_ / candidate;
     std::error_code status;
     if (fs::is_regular_file(mask, status)) return fs::equivalent(mask, photo, status) ? fs::path() : mask;
   }

@@ -21,6 +21,17 @@ void PhotoModels::runColmap(const char* step, std::vector<std::string> arguments
   colmap.run(std::move(arguments), look, isDone);
 }
 
+void PhotoModels::adjustBundle(const char* step, const fs::path& input, const fs::path& output,
+                               bool movesPrincipalPoint, const std::function<void()>& look) {
+  // Surveys have needed five to eight iterations until the cost changes by less than this share of it.
+  constexpr const char *kMaxIterations = "50", *kTolerance = "1e-6";
+  runColmap(step,
+            {"bundle_adjuster", "--input_path", input.string(), "--output_path", output.string(),
+             "--BundleAdjustment.max_num_iterations", kMaxIterations, "--BundleAdjustment.function_tolerance",
+             kTolerance, "--BundleAdjustment.refine_principal_point", movesPrincipalPoint ? "1" : "0"},
+            look, [&] { return !photosIn(output).empty(); });
+}
+
 void PhotoModels::discardMapped() const {
   for (const char* name :
        {"snapshots", "snapshot.begun", "sparse.partial", "sparse.continued", "sparse.whole", "rest.partial"})
@@ -117,11 +128,7 @@ int PhotoModels::join(const Watch& watch) {
        (folder_ / "images").string(), "--input_path", result.string(), "--output_path", points.string(),
        "--Mapper.num_threads", settings_.threadsText()},
       [&] { watch(0); }, [&] { return !photosIn(points).empty(); });
-  runColmap(
-      "joining",
-      {"bundle_adjuster", "--input_path", points.string(), "--output_path", adjusted.string(),
-       "--BundleAdjustment.max_num_iterations", kMaxAdjustments},
-      [&] { watch(0); }, [&] { return !photosIn(adjusted).empty(); });
+  adjustBundle("joining", points, adjusted, false, [&] { watch(0); });
   if (photosIn(adjusted).size() != whole.photos.size()) {
     throw Error(adjusted.string(), "", "lacks photos of the models that were joined",
                 "see joining.log beside it; run again to go on");

@@ -60,10 +60,6 @@ class PhotoModels {
 
  private:
   static constexpr size_t kLeastShared = 3;  // photos of models that model_merger joins
-  // Of bundle adjustment: iterations at most, of which surveys have needed five to eight, and the change of the cost,
-  // relative to it, that ends them.
-  static constexpr const char* kMaxAdjustments = "50";
-  static constexpr const char* kAdjustmentTolerance = "1e-6";
 
   fs::path last(bool adjusted) const;
   // What the mapper begins with: a model that it goes on from, or a pair of photos.
@@ -89,6 +85,10 @@ class PhotoModels {
   void runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch);
   void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look,
                  const std::function<bool()>& isDone = {});
+  // Adjusts all poses, points and lenses of a model; the principal points only if `movesPrincipalPoint`. Throws Error
+  // if COLMAP reports failure without a model.
+  void adjustBundle(const char* step, const fs::path& input, const fs::path& output, bool movesPrincipalPoint,
+                    const std::function<void()>& look);
   bool agreesWithGps(const fs::path& joined, const fs::path& before) const;
   SourceCapture readFrom(const fs::path& model) const;
 

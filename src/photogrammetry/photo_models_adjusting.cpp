@@ -74,12 +74,8 @@ void PhotoModels::adjust(const Watch& watch) {
     removeFolder(result);
     makeFolder(result);
     try {
-      runColmap(
-          "adjusting",
-          {"bundle_adjuster", "--input_path", begun.string(), "--output_path", result.string(),
-           "--BundleAdjustment.max_num_iterations", kMaxAdjustments, "--BundleAdjustment.function_tolerance",
-           kAdjustmentTolerance, "--BundleAdjustment.refine_principal_point", fullLens && allHaveMany ? "1" : "0"},
-          [&] { watch(static_cast<int64_t>(list_.photos.size())); }, [&] { return !photosIn(result).empty(); });
+      adjustBundle("adjusting", begun, result, fullLens && allHaveMany,
+                   [&] { watch(static_cast<int64_t>(list_.photos.size())); });
     } catch (const ColmapKilled&) {
       throw;
     } catch (const Error& error) {

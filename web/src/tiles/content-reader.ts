@@ -34,6 +34,7 @@ export class ContentReader {
     throw new SceneError(this.name, '', reason, remedy);
   }
 
+  // Fails for good: trying again cannot help.
   protected refuse(reason: string, remedy: string): never {
     throw new SceneError(this.name, '', reason, remedy, true);
   }
