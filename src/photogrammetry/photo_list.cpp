@@ -15,6 +15,7 @@
 #include "base/image_io.h"
 #include "base/log.h"
 #include "import/clean.h"
+#include "photogrammetry/files_below.h"
 
 namespace tessera {
 namespace {
@@ -48,21 +49,8 @@ bool isOtherFormat(const fs::path& path) {
 }
 
 std::vector<fs::path> photoFiles(const fs::path& folder) {
-  std::vector<fs::path> files;
-  std::error_code status;
-  fs::recursive_directory_iterator at(folder, fs::directory_options::follow_directory_symlink, status), end;
-  fs::path last = folder;
-  std::set<fs::path> seen{fs::weakly_canonical(folder)};  // symbolic links can lead in circles
-  for (; !status && at != end; at.increment(status)) {
-    last = at->path();
-    const bool isHidden = last.filename().string().starts_with(".");
-    std::error_code ignored;
-    if (at->is_directory(ignored) && (isHidden || !seen.insert(fs::weakly_canonical(last, ignored)).second))
-      at.disable_recursion_pending();
-    if (!isHidden && (isPhotoName(last) || isOtherFormat(last)) && at->is_regular_file(ignored)) files.push_back(last);
-  }
-  // A shorter list would be taken for other photos, and poses of all would be lost.
-  if (status) throw Error(last.string(), "", "cannot be listed: " + status.message(), "make it readable, or remove it");
+  std::vector<fs::path> files = filesBelow(folder);
+  std::erase_if(files, [](const fs::path& file) { return !isPhotoName(file) && !isOtherFormat(file); });
   return files;
 }
 

@@ -12,6 +12,7 @@
 #include "base/log.h"
 #include "import/colmap_model.h"
 #include "import/photo_files.h"
+#include "photogrammetry/files_below.h"
 
 namespace tessera {
 namespace {
@@ -50,14 +51,10 @@ PhotoMasks::PhotoMasks(fs::path folder) : folder_(std::move(folder)) {
 
 std::string PhotoMasks::describe() const {
   std::vector<std::string> lines;
-  std::error_code status;
-  fs::recursive_directory_iterator at(folder_, status), end;
-  for (; !status && at != end; at.increment(status)) {
-    std::error_code ignored;
-    if (isPhotoName(at->path()) && at->is_regular_file(ignored))
-      lines.push_back(at->path().lexically_relative(folder_).generic_string() + " " + fileDigest(at->path()) + "\n");
+  for (const fs::path& file : filesBelow(folder_)) {
+    if (isPhotoName(file))
+      lines.push_back(file.lexically_relative(folder_).generic_string() + " " + fileDigest(file) + "\n");
   }
-  if (status) throw Error(folder_.string(), "", "cannot be listed: " + status.message(), "make it readable");
   std::sort(lines.begin(), lines.end());
   std::string text;
   for (const std::string& line : lines) text += line;

@@ -70,6 +70,14 @@ TEST_F(PhotoMasksOf, AListMayBeLinks) {
   list_.photos[1].name = "../elsewhere/mask.jpg";
   PhotoMasks(masks_).addTo(list_);
   EXPECT_TRUE(list_.photos[1].mask.empty());
+  fs::create_directory_symlink(folder_ / "elsewhere", masks_ / "b");
+  fs::create_directory_symlink(masks_, masks_ / "circle");
+  const std::string before = PhotoMasks(masks_).describe();
+  writePng(folder_ / "elsewhere/mask.png", ImageU8(16, 12, 1, 7));
+  EXPECT_NE(PhotoMasks(masks_).describe(), before);
+  const std::string between = PhotoMasks(masks_).describe();
+  writePng(folder_ / "elsewhere/three.png", ImageU8(16, 12, 1, 255));
+  EXPECT_NE(PhotoMasks(masks_).describe(), between);
 }
 
 TEST_F(PhotoMasksOf, AListAreWrittenUntilTheWatchEndsIt) {

@@ -1,0 +1,27 @@
+#include "photogrammetry/files_below.h"
+
+#include <set>
+
+#include "base/error.h"
+
+namespace tessera {
+
+std::vector<fs::path> filesBelow(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code status;
+  fs::recursive_directory_iterator at(folder, fs::directory_options::follow_directory_symlink, status), end;
+  fs::path last = folder;
+  std::set<fs::path> seen{fs::weakly_canonical(folder)};
+  for (; !status && at != end; at.increment(status)) {
+    last = at->path();
+    const bool isHidden = last.filename().string().starts_with(".");
+    std::error_code ignored;
+    if (at->is_directory(ignored) && (isHidden || !seen.insert(fs::weakly_canonical(last, ignored)).second))
+      at.disable_recursion_pending();
+    if (!isHidden && at->is_regular_file(ignored)) files.push_back(last);
+  }
+  if (status) throw Error(last.string(), "", "cannot be listed: " + status.message(), "make it readable, or remove it");
+  return files;
+}
+
+}  // namespace tessera

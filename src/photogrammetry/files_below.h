@@ -1,0 +1,15 @@
+// The files of a folder that a user names.
+#pragma once
+
+#include <vector>
+
+#include "base/file.h"
+
+namespace tessera {
+
+// The regular files of `folder` and its subfolders, in no order. Symbolic links are followed, each folder once, as they
+// can lead in circles; files and folders whose names begin with a dot are left out. Throws Error if a folder cannot be
+// listed: a shorter list would be taken for another one.
+std::vector<fs::path> filesBelow(const fs::path& folder);
+
+}  // namespace tessera
