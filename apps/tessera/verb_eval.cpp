@@ -12,6 +12,12 @@
 #include "import/capture_reader.h"
 
 namespace tessera {
+namespace {
+
+constexpr const char* kNoResponse =
+    "it was trained without exposures, EXIF states too few of them, or it does not explain how its photos differ";
+
+}  // namespace
 
 void addEvalVerb(CLI::App& app) {
   struct Flags {
@@ -69,10 +75,10 @@ void addEvalVerb(CLI::App& app) {
       options.response = renderSource->exposureResponse();
       if (!options.response && choosesExposures) {
         options.exposures = Exposures::neutral;
+        inform("exposures: neutral, as {}", kNoResponse);
       } else if (!options.response) {
         throw Error(flags->model, "--exposure predicted",
-                    "does not tell how colours follow exposures: EXIF does not explain the gains of its photos",
-                    "use neutral or fitted");
+                    std::string("does not tell how colours follow exposures: ") + kNoResponse, "use neutral or fitted");
       }
     }
     options.lpipsWeights = flags->lpips;

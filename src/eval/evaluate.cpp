@@ -69,16 +69,25 @@ void limitToOpaque(std::optional<ImageU8>& mask, const ImageF& opacity) {
   }
 }
 
-// Returns the argmin over g of Σ (g·rendered − photo)² on the left half, per channel.
-std::array<double, 3> fittedGain(const ImageF& rendered, const ImageF& photo, const ImageU8* mask) {
+// What the background adds to each pixel of the view.
+ImageF backgroundBehind(const RenderedView& view, const Eigen::Array3f& background) {
+  ImageF behind(view.colour.width, view.colour.height, 3);
+  for (size_t p = 0; p < behind.pixelCount(); ++p) {
+    for (int c = 0; c < 3; ++c) behind.pixels[3 * p + c] = (1 - view.opacity.pixels[p]) * background[c];
+  }
+  return behind;
+}
+
+// Returns the argmin over g of Σ (g·colour + behind − photo)² on the left half, per channel.
+std::array<double, 3> fittedGain(const ImageF& colour, const ImageF& behind, const ImageF& photo, const ImageU8* mask) {
   std::array<double, 3> gain = {1, 1, 1};
   for (int c = 0; c < 3; ++c) {
     double products = 0, squares = 0;
     for (int y = 0; y < photo.height; ++y) {
       for (int x = 0; x < photo.width / 2; ++x) {
         if (mask && mask->at(x, y)[0] == 0) continue;
-        const double value = rendered.at(x, y)[c];
-        products += value * photo.at(x, y)[c];
+        const double value = colour.at(x, y)[c];
+        products += value * (double{photo.at(x, y)[c]} - behind.at(x, y)[c]);
         squares += value * value;
       }
     }
@@ -144,11 +153,12 @@ class ViewEvaluator {
     if (!renderer.showsOutside() && !isTransparent) limitToOpaque(mask, view.opacity);
     const ImageU8* maskPointer = mask ? &*mask : nullptr;
 
-    ImageF rendered = compositeOver(view, renderer.background());
-    if (options_.exposures == Exposures::fitted) result.gain = fittedGain(rendered, target, maskPointer);
+    // The gain does not apply to the background, as in training (compute/exposure.h).
+    ImageF rendered = backgroundBehind(view, renderer.background());
+    if (options_.exposures == Exposures::fitted) result.gain = fittedGain(view.colour, rendered, target, maskPointer);
     if (options_.exposures == Exposures::predicted) result.gain = options_.response->gain(photo.exposure);
     for (size_t i = 0; i < rendered.pixels.size(); ++i) {
-      const float value = rendered.pixels[i] * static_cast<float>(result.gain[i % 3]);
+      const float value = view.colour.pixels[i] * static_cast<float>(result.gain[i % 3]) + rendered.pixels[i];
       rendered.pixels[i] = value > 0 ? std::min(value, 1.0f) : 0.0f;  // NaN becomes black, and shows as an error
     }
 

@@ -74,8 +74,8 @@ struct EvaluationReport {
   std::vector<SurfaceCoverage> coverage;
 };
 
-// Evaluates all photos of the split. The premultiplied colour of the render is composited over renderer.background(),
-// multiplied by the gain, clamped to [0, 1], and compared, unrounded, with the photo's bytes / 255. Photos larger than
+// Evaluates all photos of the split. The premultiplied colour of the render is multiplied by the gain, composited over
+// renderer.background(), clamped to [0, 1], and compared, unrounded, with the photo's bytes / 255. Photos larger than
 // their camera are downscaled by area averaging; photos with alpha are composited over the same background. Where a
 // photo has a mask, its black pixels are excluded from PSNR, windows that touch one are excluded from SSIM, and for
 // LPIPS they are replaced in the render by the photo's pixels. Unless ViewRenderer::showsOutside, pixels of photos

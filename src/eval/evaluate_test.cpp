@@ -168,6 +168,28 @@ TEST(Evaluate, FitsAGainOnTheLeftHalfAndEvaluatesTheRightHalf) {
   EXPECT_NE(toJson(second).find("fitted on the left half, judged on the right"), std::string::npos);
 }
 
+// As in training: the sky behind a transparent place is not brightened with it.
+TEST(Evaluate, AppliesGainsToTheSceneAlone) {
+  FakeCapture fake("evaluate_background");
+  const ImageU8 photo = fakePhoto(64, 48, 1);
+  fake.add("a", photo);
+  const Eigen::Array3f background(0.5f, 0.25f, 0.75f);
+  ImageF scene = toFloat(photo);
+  // Half transparent: the photo shows twice the colour that was rendered, over half of the background.
+  for (size_t i = 0; i < scene.pixels.size(); ++i)
+    scene.pixels[i] = (scene.pixels[i] - 0.5f * background[static_cast<int>(i % 3)]) / 2;
+  FakeRenderer renderer([&scene](const Camera& camera, int) {
+    return RenderedView{scene, ImageF(camera.width, camera.height, 1, 0.5f),
+                        ImageF(camera.width, camera.height, 1, 1.0f)};
+  });
+  renderer.colourBehind = background;
+  EvaluateOptions options;
+  options.exposures = Exposures::fitted;
+  const EvaluationReport report = evaluate(renderer, fake.capture, options);
+  for (size_t c = 0; c < 3; ++c) EXPECT_NEAR(report.views[0].gain[c], 2, 1e-4);
+  EXPECT_GT(report.psnr, 90);
+}
+
 TEST(Evaluate, AppliesTheGainThatAPhotosExposurePredicts) {
   FakeCapture fake("evaluate_predicted");
   const ImageU8 photo = fakePhoto(64, 48, 1);

@@ -182,6 +182,16 @@ std::optional<double> exposureStops(const ExposureTags& exposure) {
   return std::log2(exposure.seconds * exposure.iso / (aperture * aperture));
 }
 
+std::vector<std::optional<double>> comparableStops(std::span<const ExposureTags> exposures) {
+  int with = 0, without = 0;
+  for (const ExposureTags& exposure : exposures)
+    if (exposureStops(exposure)) ++(exposure.aperture > 0 ? with : without);
+  std::vector<std::optional<double>> stops;
+  for (const ExposureTags& exposure : exposures)
+    stops.push_back((exposure.aperture > 0) == (with >= without) ? exposureStops(exposure) : std::nullopt);
+  return stops;
+}
+
 PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
   PhotoTags tags;
   constexpr size_t kMax = size_t{1} << 28;

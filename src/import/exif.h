@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "base/file.h"
 #include "scene/capture.h"
@@ -49,6 +50,9 @@ struct PhotoTags {
 // Returns the light that a picture collects in powers of two, up to a constant: log2(time · ISO / aperture²). An
 // unknown aperture is that of a lens without one. Nothing if time or ISO is unknown.
 std::optional<double> exposureStops(const ExposureTags& exposure);
+// Returns these of several photos. If only some of them state an aperture (there are lenses that do not tell it), the
+// exposures of the fewer ones are unknown, as they do not compare.
+std::vector<std::optional<double>> comparableStops(std::span<const ExposureTags> exposures);
 
 // Decodes the tags of a JPEG file from its untrusted bytes (all of them, or the first part). Missing and implausible
 // tags are empty. The position and altitude of XMP, which has more digits, precede those of EXIF, unless the position

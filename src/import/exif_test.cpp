@@ -247,6 +247,20 @@ TEST(Exif, CountsExposureInStops) {
   EXPECT_FALSE(exposureStops({0.01, 0, 2}).has_value());
 }
 
+TEST(Exif, ComparesExposuresOfMostPhotos) {
+  const ExposureTags with{0.01, 200, 2}, without{0.01, 200, 0}, unknown{0, 200, 2};
+  const auto known = [](const std::vector<ExposureTags>& tags) {
+    std::string text;
+    for (const auto& stops : comparableStops(tags)) text += stops ? "k" : "-";
+    return text;
+  };
+  EXPECT_EQ(known({with, with, without, unknown}), "kk--");
+  EXPECT_EQ(known({without, with, without, unknown}), "k-k-");
+  EXPECT_EQ(known({without, without}), "kk");
+  EXPECT_EQ(known({unknown}), "-");
+  EXPECT_EQ(comparableStops(std::vector<ExposureTags>{with})[0], exposureStops(with));
+}
+
 TEST(Exif, ReadsARealDrone) {
   SKIP_WITHOUT_SHARED_DATA("brighton_beach");
   const fs::path beach = sharedData("brighton_beach");

@@ -278,19 +278,23 @@ void checkMasks(const std::vector<Photo>& photos, const fs::path& out, bool areM
 
 // Sets the exposures of photos whose source does not know them, from EXIF. Nothing is set if most have no tags.
 void setExposures(Capture& capture, const std::vector<PhotoFacts>& facts) {
-  std::vector<std::optional<double>> stops;
+  std::vector<ExposureTags> tags;
+  for (size_t i = 0; i < capture.photos.size(); ++i) {
+    if (capture.photos[i].exposure) return;
+    tags.push_back(facts[i].tags.exposure);
+  }
+  const std::vector<std::optional<double>> stops = comparableStops(tags);
   double sum = 0;
   int count = 0;
-  for (size_t i = 0; i < capture.photos.size(); ++i) {
-    if (capture.photos[i].exposure != 0) return;
-    stops.push_back(exposureStops(facts[i].tags.exposure));
-    if (!stops.back()) continue;
-    sum += *stops.back();
+  for (const std::optional<double>& one : stops) {
+    if (!one) continue;
+    sum += *one;
     ++count;
   }
   if (2 * count < static_cast<int>(stops.size())) return;
   for (size_t i = 0; i < stops.size(); ++i)
     if (stops[i]) capture.photos[i].exposure = *stops[i] - sum / count;
+  inform("exposures of {} of {} photos by EXIF", count, stops.size());
 }
 
 // Names the files of the source: those of the capture may have other names.

@@ -63,9 +63,10 @@ TEST(RealData, BrightonBeachLooksDownFromAFlightAndItsPointsProjectBack) {
   // The exposures of EXIF, against their mean.
   double sum = 0, least = 1e9, greatest = -1e9;
   for (const Photo& photo : capture.photos) {
-    sum += photo.exposure;
-    least = std::min(least, photo.exposure);
-    greatest = std::max(greatest, photo.exposure);
+    ASSERT_TRUE(photo.exposure.has_value());
+    sum += *photo.exposure;
+    least = std::min(least, *photo.exposure);
+    greatest = std::max(greatest, *photo.exposure);
   }
   EXPECT_NEAR(sum, 0, 1e-9);
   EXPECT_GT(greatest - least, 0.1);

@@ -272,7 +272,7 @@ bool readFrame(const Json& object, const Intrinsics& shared, TransformsFile& fil
     const double camera = numberOr(ours, "camera", -1);
     if (camera >= 0 && camera < static_cast<double>(file.cameras.size())) frame.camera = static_cast<int>(camera);
     frame.name = textOr(ours, "name");
-    frame.exposure = numberOr(ours, "exposure", 0);
+    if (ours.contains("exposure")) frame.exposure = numberOr(ours, "exposure", 0);
     const double orientation = numberOr(ours, "orientation", 1);
     if (orientation >= 1 && orientation <= 8) frame.orientation = static_cast<int>(orientation);
     const double unit = numberOr(ours, "depth_unit", 0);

@@ -31,7 +31,7 @@ struct TransformsFrame {
   Intrinsics intrinsics;                        // the frame's own override those of the file
   int camera = -1;                              // index into TransformsFile::cameras, -1: use the intrinsics
   std::string name;
-  double exposure = 0;
+  std::optional<double> exposure;
   int orientation = 1;  // of EXIF, 1 to 8
   float depthUnit = 0;  // 0: not given
   std::optional<GpsFix> gps;

@@ -41,8 +41,8 @@ std::string describe(const Capture& capture) {
   }
   for (const Photo& photo : capture.photos) {
     const Pose& pose = photo.worldFromCamera;
-    text += fmt::format("{} {} {} {} {}", photo.name, photo.camera, static_cast<int>(photo.split), photo.exposure,
-                        photo.depthUnit);
+    text += fmt::format("{} {} {} {} {}", photo.name, photo.camera, static_cast<int>(photo.split),
+                        photo.exposure.value_or(0), photo.depthUnit);
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k) text += fmt::format(" {}", pose.rotation(i, k));
     for (int i = 0; i < 3; ++i) text += fmt::format(" {}", pose.translation[i]);

@@ -267,7 +267,10 @@ class RunPage {
     if (!evaluation_) return "";
     return fmt::format("<h2>Exposure</h2>\n<p>Of the renderings that were compared with held-out photos: {}{}.</p>\n",
                        escapedHtml(evaluation_->exposure),
-                       evaluation_->exposure == "neutral" ? ", as they were rendered" : "");
+                       evaluation_->exposure == "neutral"
+                           ? ", as they were rendered: EXIF states the exposures of too few photos, or does not "
+                             "explain how they differ"
+                           : "");
   }
 
   std::string stages() const {

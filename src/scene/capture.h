@@ -31,7 +31,7 @@ struct Photo {
   std::filesystem::path depth;  // EXR (world units) or 16-bit PNG of z-depth along the optical axis; may be empty
   float depthUnit = 0.001f;     // world units per step of an integer depth PNG
   Split split = Split::train;
-  double exposure = 0;  // log2 gain relative to the capture's mean, 0 when unknown
+  std::optional<double> exposure;  // log2 of the light that was collected, relative to the capture's mean, if known
   // Of EXIF, 1 to 8: how people look at it. Its pixels, camera and pose are those of the picture as it is stored.
   int orientation = 1;
   std::optional<GpsFix> gps;

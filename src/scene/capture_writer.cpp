@@ -119,7 +119,7 @@ Json frameToJson(const Capture& capture, const Photo& photo) {
   Json& ours = frame["tessera"];
   ours["camera"] = photo.camera;
   if (photo.name != frame["file_path"].get<std::string>()) ours["name"] = photo.name;
-  if (photo.exposure != 0) ours["exposure"] = photo.exposure;
+  if (photo.exposure) ours["exposure"] = *photo.exposure;
   if (photo.orientation != 1) ours["orientation"] = photo.orientation;
   if (!photo.depth.empty()) ours["depth_unit"] = photo.depthUnit;
   if (photo.gps) {

@@ -7,15 +7,15 @@
 
 namespace tessera {
 
-std::array<double, 3> ExposureResponse::gain(double exposure) const {
+std::array<double, 3> ExposureResponse::gain(std::optional<double> exposure) const {
   std::array<double, 3> gains = {1, 1, 1};
-  if (exposure == 0) return gains;
-  for (size_t c = 0; c < 3; ++c) gains[c] = std::exp2(double{offset[c]} + double{slope[c]} * exposure);
+  if (!exposure) return gains;
+  for (size_t c = 0; c < 3; ++c) gains[c] = std::exp2(double{offset[c]} + double{slope[c]} * *exposure);
   return gains;
 }
 
-std::optional<ExposureResponse> fitExposureResponse(std::span<const double> exposures, std::span<const int> trained,
-                                                    std::span<const float> logGains) {
+std::optional<ExposureResponse> fitExposureResponse(std::span<const std::optional<double>> exposures,
+                                                    std::span<const int> trained, std::span<const float> logGains) {
   CHECK(logGains.size() == 3 * exposures.size());
   constexpr size_t kLeastPhotos = 8;
   constexpr double kLeastDeviation = 0.05;                  // stops
@@ -23,13 +23,13 @@ std::optional<ExposureResponse> fitExposureResponse(std::span<const double> expo
   constexpr double kLeastSlope = -0.5, kGreatestSlope = 2;  // what more light does to a photo, with some error
   std::vector<size_t> known;
   for (const int photo : trained)
-    if (exposures[static_cast<size_t>(photo)] != 0) known.push_back(static_cast<size_t>(photo));
+    if (exposures[static_cast<size_t>(photo)]) known.push_back(static_cast<size_t>(photo));
   if (known.size() < kLeastPhotos) return std::nullopt;
   const auto n = static_cast<double>(known.size());
   double meanExposure = 0;
-  for (const size_t i : known) meanExposure += exposures[i] / n;
+  for (const size_t i : known) meanExposure += *exposures[i] / n;
   double squares = 0;
-  for (const size_t i : known) squares += std::pow(exposures[i] - meanExposure, 2);
+  for (const size_t i : known) squares += std::pow(*exposures[i] - meanExposure, 2);
   if (!(squares > n * kLeastDeviation * kLeastDeviation)) return std::nullopt;
 
   ExposureResponse response;
@@ -37,7 +37,7 @@ std::optional<ExposureResponse> fitExposureResponse(std::span<const double> expo
   for (size_t c = 0; c < 3; ++c) {
     double mean = 0, products = 0;
     for (const size_t i : known) mean += double{logGains[3 * i + c]} / n;
-    for (const size_t i : known) products += (exposures[i] - meanExposure) * (logGains[3 * i + c] - mean);
+    for (const size_t i : known) products += (*exposures[i] - meanExposure) * (logGains[3 * i + c] - mean);
     const double slope = products / squares;
     if (!(slope >= kLeastSlope && slope <= kGreatestSlope)) return std::nullopt;
     response.slope[c] = static_cast<float>(slope);
@@ -45,7 +45,7 @@ std::optional<ExposureResponse> fitExposureResponse(std::span<const double> expo
     for (const size_t i : known) {
       const double difference = logGains[3 * i + c] - mean;
       total += difference * difference;
-      left += std::pow(difference - slope * (exposures[i] - meanExposure), 2);
+      left += std::pow(difference - slope * (*exposures[i] - meanExposure), 2);
     }
   }
   if (!(left < (1 - kLeastExplained) * total)) return std::nullopt;

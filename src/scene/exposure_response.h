@@ -13,8 +13,8 @@ namespace tessera {
 struct ExposureResponse {
   std::array<float, 3> slope{}, offset{};
 
-  // The factors for the colours of a photo, by channel. Those of 1 if its exposure is not known.
-  std::array<double, 3> gain(double exposure) const;
+  // The factors for the colours of a photo, by channel. They are 1 if its exposure is not known.
+  std::array<double, 3> gain(std::optional<double> exposure) const;
   bool operator==(const ExposureResponse&) const = default;
 };
 
@@ -22,7 +22,7 @@ struct ExposureResponse {
 // Returns nothing if the exposures of fewer than eight of them are known, if these hardly differ, or if they explain
 // less than half of the variance of the gains, or with a slope that light does not have: then something else, such as
 // clouds, has changed the light.
-std::optional<ExposureResponse> fitExposureResponse(std::span<const double> exposures, std::span<const int> trained,
-                                                    std::span<const float> logGains);
+std::optional<ExposureResponse> fitExposureResponse(std::span<const std::optional<double>> exposures,
+                                                    std::span<const int> trained, std::span<const float> logGains);
 
 }  // namespace tessera

@@ -33,7 +33,7 @@ std::vector<float> gains(const Capture& capture, double slope, double noise) {
       const bool isTrained = capture.photos[i].split == Split::train;
       logGains.push_back(
           isTrained
-              ? static_cast<float>((slope + 0.1 * static_cast<double>(c)) * capture.photos[i].exposure + 0.2 + error)
+              ? static_cast<float>((slope + 0.1 * static_cast<double>(c)) * *capture.photos[i].exposure + 0.2 + error)
               : 0.0f);
     }
   }
@@ -41,7 +41,7 @@ std::vector<float> gains(const Capture& capture, double slope, double noise) {
 }
 
 std::optional<ExposureResponse> fit(const Capture& capture, const std::vector<float>& logGains) {
-  std::vector<double> exposures;
+  std::vector<std::optional<double>> exposures;
   for (const Photo& photo : capture.photos) exposures.push_back(photo.exposure);
   return fitExposureResponse(exposures, capture.photosIn(Split::train), logGains);
 }
@@ -55,7 +55,8 @@ TEST(ExposureResponse, IsTheLineThroughTheGainsOfTrainedPhotos) {
     EXPECT_NEAR(response->offset[c], 0.2, 1e-5);
   }
   EXPECT_NEAR(response->gain(1)[0], std::exp2(0.65), 1e-5);
-  EXPECT_EQ(response->gain(0), (std::array<double, 3>{1, 1, 1})) << "an exposure that is not known";
+  EXPECT_NEAR(response->gain(0)[0], std::exp2(0.2), 1e-5);
+  EXPECT_EQ(response->gain(std::nullopt), (std::array<double, 3>{1, 1, 1}));
 }
 
 TEST(ExposureResponse, IsUsedOnlyIfItExplainsMostOfTheGains) {
@@ -79,7 +80,7 @@ TEST(ExposureResponse, NeedsPhotosWhoseExposuresAreKnownAndDiffer) {
   const std::vector<float> logGains = gains(same, 0.45, 0);
   for (Photo& photo : same.photos) photo.exposure = 0.01;
   EXPECT_FALSE(fit(same, logGains).has_value());
-  for (Photo& photo : same.photos) photo.exposure = 0;
+  for (Photo& photo : same.photos) photo.exposure.reset();
   EXPECT_FALSE(fit(same, logGains).has_value());
 }
 

@@ -40,6 +40,8 @@ class ViewRenderer {
   // channel, the camera's size, infinity where there is none).
   virtual RenderedView render(const Camera& camera, const Pose& worldFromCamera,
                               const ImageF* opaqueDepth = nullptr) = 0;
+  // Returns why views of this camera cannot be rendered; nothing if they can.
+  virtual std::string whyNotThrough(const Camera&) const { return ""; }
   // Returns a description of the device that renders, such as "cpu avx3 2 threads".
   virtual std::string device() const = 0;
   // Returns the colour of the background, which the caller composites under the rendered view.

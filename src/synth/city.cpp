@@ -175,17 +175,17 @@ Capture synthesiseCity(const fs::path& out, const CityOptions& options) {
     if (options.traffic) photo.mask = out / "masks" / (stem + ".png");
     photo.worldFromCamera = stations[i].worldFromCamera;
     photo.split = options.holdoutEvery > 0 && i % options.holdoutEvery == 0 ? Split::test : Split::train;
-    photo.exposure = exposures[i];
+    if (options.exposureJitter > 0) photo.exposure = exposures[i];
     const GpsFix fix = gpsAt(earth, options, stations[i], i, ground);
     std::optional<ExifFields> exif;
     if (options.exif) {
       photo.gps = fix;
-      exif = {fix, 36 * camera.focalX() / camera.width, photo.exposure, isoStops(options, i), stations[i].seconds};
+      exif = {fix, 36 * camera.focalX() / camera.width, exposures[i], isoStops(options, i), stations[i].seconds};
     }
     if (!complete(photo)) {
       std::optional<TrafficScene> traffic;
       if (options.traffic) traffic.emplace(city, stations[i].seconds);
-      const ShutterOptions shutter{options.samplesPerPixel, photo.exposure, mix64(options.seed) + i};
+      const ShutterOptions shutter{options.samplesPerPixel, exposures[i], mix64(options.seed) + i};
       const Exposed exposed =
           takePhoto({city, traffic ? &*traffic : nullptr}, lens, photo.worldFromCamera, shutter, pool);
       writePhoto(photo, exposed, exif);

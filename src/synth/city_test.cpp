@@ -81,7 +81,7 @@ TEST_F(City, WritesPhotosDepthsMasksAndTransforms) {
     EXPECT_EQ(mask.image.channels, 1);
     const ImageF depth = readDepth(photo.depth);
     EXPECT_EQ(depth.height, 24);
-    exposure += photo.exposure;
+    exposure += photo.exposure.value();
   }
   EXPECT_NEAR(exposure, 0, 1e-9);
   EXPECT_NE(capture.photos[0].exposure, capture.photos[1].exposure);

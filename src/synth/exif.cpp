@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <string>
 
 namespace tessera {
@@ -78,6 +80,12 @@ std::string directory(const std::vector<Entry>& entries, size_t at) {
   return head + tail;
 }
 
+// At most what EXIF can state, about four seconds.
+uint32_t exposureNanoseconds(const ExifFields& f) {
+  constexpr double kMax = std::numeric_limits<uint32_t>::max();
+  return static_cast<uint32_t>(std::clamp(std::round(2e6 * std::exp2(f.exposure - f.isoStops)), 1.0, kMax));
+}
+
 }  // namespace
 
 Bytes encodeExif(const ExifFields& f) {
@@ -87,13 +95,12 @@ Bytes encodeExif(const ExifFields& f) {
   const auto thousandths = [](double value) { return static_cast<uint32_t>(std::llround(value * 1000)); };
   std::vector<Entry> main{text(0x010f, "tessera"), text(0x0110, "synthetic drone"), number(0x0112, kShort, 1),
                           text(0x0132, when),      number(0x8769, kLong, 0),        number(0x8825, kLong, 0)};
-  const std::vector<Entry> camera{
-      rationals(0x829a, {{static_cast<uint32_t>(std::lround(2e6 * std::exp2(f.exposure - f.isoStops))), 1000000000}}),
-      rationals(0x829d, {{28, 10}}),
-      number(0x8827, kShort, 100u << f.isoStops),
-      text(0x9003, when),
-      rationals(0x920a, {{thousandths(f.focalLength35 / 5.6), 1000}}),
-      number(0xa405, kShort, static_cast<uint32_t>(std::lround(f.focalLength35)))};
+  const std::vector<Entry> camera{rationals(0x829a, {{exposureNanoseconds(f), 1000000000}}),
+                                  rationals(0x829d, {{28, 10}}),
+                                  number(0x8827, kShort, 100u << f.isoStops),
+                                  text(0x9003, when),
+                                  rationals(0x920a, {{thousandths(f.focalLength35 / 5.6), 1000}}),
+                                  number(0xa405, kShort, static_cast<uint32_t>(std::lround(f.focalLength35)))};
   const std::vector<Entry> gps{{0x0000, kByte, 4, std::string("\2\3\0\0", 4)},
                                text(0x0001, f.gps.latitude < 0 ? "S" : "N"),
                                degrees(0x0002, f.gps.latitude),

@@ -75,9 +75,11 @@ class FakeRenderer : public ViewRenderer {
   std::string device() const override { return "fake <device>"; }
   Eigen::Array3f background() const override { return colourBehind; }
   bool showsOutside() const override { return hasOutside; }
+  std::string whyNotThrough(const Camera&) const override { return refusal; }
 
   Eigen::Array3f colourBehind = Eigen::Array3f::Zero();
   bool hasOutside = true;
+  std::string refusal;  // of all cameras
 
  private:
   Draw draw_;

@@ -10,7 +10,7 @@ struct PhotoLossSettings {
   SETTING(std::string, loss, "mse", "loss", "colour loss: huber, mse or charbonnier", anything());  // see colour_loss.h
   SETTING(double, lossParameter, 0.1, "loss_parameter", "delta of huber, epsilon of charbonnier", positive());
   SETTING(bool, exposure, true, "exposure", "fit an exposure to each photo", anything());
-  SETTING(double, exposureLearningRate, 1e-3, "exposure_learning_rate", "learning rate of the photos' exposures",
+  SETTING(double, exposureLearningRate, 5e-3, "exposure_learning_rate", "learning rate of the photos' exposures",
           atLeast(0));
 };
 

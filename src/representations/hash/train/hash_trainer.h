@@ -23,6 +23,8 @@ class HashTrainer final : public TrainableModel {
 
   HashModel& model() { return model_; }
 
+  // Of a coarser level: takes the exposures of the level below, and does not train them (PhotoExposures::hold).
+  void holdExposures(const ModelFolder& below) { photoLoss_.exposures().hold(below); }
   // Restricts the following rays to these shares of photos, [photos]: for training, or for evaluate().
   void trainOn(std::vector<TileShares> photos);
   void evaluateOn(std::vector<TileShares> photos);

@@ -114,7 +114,9 @@ std::unique_ptr<TrainableModel> HashMethod::begin(const BlockTraining& on, const
   tiles_ =
       groupsOfLevel(static_cast<uint32_t>(on.grid.columns), static_cast<uint32_t>(on.grid.rows), level.level, false)
           .cells.size();
-  return std::make_unique<HashTrainer>(on.device, on.capture, config_, on.grid);
+  auto trainer = std::make_unique<HashTrainer>(on.device, on.capture, config_, on.grid);
+  if (level.level > 0) trainer->holdExposures(level.below);
+  return trainer;
 }
 
 void HashMethod::reportMemory(const BlockTraining& on) const {

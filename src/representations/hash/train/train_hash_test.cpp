@@ -68,7 +68,9 @@ TEST(HashLevels, HaveHalfTheLatticeOneFineLevelFewerAndAQuarterOfTheEntries) {
 }
 
 TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
-  const TrainingResult result = train(options(60));
+  TrainHashOptions exposed = options(60);
+  exposed.config.exposure = true;
+  const TrainingResult result = train(exposed);
   EXPECT_TRUE(result.finished);
   EXPECT_EQ(result.step, 60);
   const fs::path model = scene_ / "model";
@@ -77,6 +79,13 @@ TEST_F(HashTraining, MakesCoarserLevelsOfTheSameBlocks) {
   EXPECT_EQ(coarse.lattice, 16);
   EXPECT_EQ(coarse.finestStep, 60);
   EXPECT_EQ(ModelFolder(levelFolder(model, 1)).manifest()->step, 30);
+  const auto exposures = [](const fs::path& folder) {
+    const Safetensors state = readSafetensors(folder / ModelFolder(folder).manifest()->files[0]);
+    const auto values = state.require("state", "exposures", TensorType::f32).as<float>();
+    return std::vector<float>(values.begin(), values.end());
+  };
+  EXPECT_NE(exposures(model), std::vector<float>(exposures(model).size(), 0.0f));
+  EXPECT_EQ(exposures(levelFolder(model, 1)), exposures(model));
 
   // Both levels are rendered, the coarser one in one tile of two parts.
   const HashLevelModels models = [&](uint32_t level) { return loadHashModel(*device_, levelFolder(model, level)); };

@@ -105,6 +105,7 @@ std::unique_ptr<TrainableModel> VolumeMethod::begin(const BlockTraining& on, con
   }
   auto trainer =
       std::make_unique<VolumeTrainer>(on.device, on.capture, config_, on.grid, level.folder.root() / kWaiting);
+  if (level.level > 0) trainer->holdExposures(level.below);
   if (level.level > 0 && !level.folder.manifest()) trainer->beginFrom(level.below.root());
   trainer_ = trainer.get();
   models_ = trainer->model().groups().cells.size();

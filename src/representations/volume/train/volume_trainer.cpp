@@ -316,7 +316,6 @@ void VolumeTrainer::beginFrom(const fs::path& below) {
       return tensor.first.ends_with(".m1") || tensor.first.ends_with(".m2") || tensor.first.ends_with(".count");
     });
     restoreBlock(block, path, state);
-    if (block == 0) photoLoss_.exposures().restore(path, state);
   }
 }
 

@@ -27,9 +27,10 @@ class VolumeTrainer final : public TrainableModel {
 
   std::optional<uint32_t> firstNonFinitePart() override;
 
-  // Initialises a coarser level with the fields of the level below, as trained in that folder, and with its photo
-  // exposures.
+  // Initialises a coarser level with the fields of the level below, as trained in that folder.
   void beginFrom(const fs::path& below);
+  // Of a coarser level: takes the exposures of the level below, and does not train them (PhotoExposures::hold).
+  void holdExposures(const ModelFolder& below) { photoLoss_.exposures().hold(below); }
   // The schedule of resident blocks; null if all blocks are in memory.
   const Residency* residency() const { return residency_ ? &*residency_ : nullptr; }
 
