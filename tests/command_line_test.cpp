@@ -502,6 +502,13 @@ TEST_F(CommandLine, FollowsACameraPath) {
   said = run({"render", model(), at("flown-large"), "--path", path, "--size", "32x20"});
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_EQ(probeImageFile(at("flown-large/00002.png")).width, 32);
+  // The height of the view is that of the path, so that a wider image shows the same in its middle.
+  said = run({"render", model(), at("flown-wide"), "--path", path, "--size", "48x18"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  const ImageU8 wide = readImage(at("flown-wide/00001.png")).image;
+  for (int y = 0; y < 18; ++y)
+    for (int x = 0; x < 24; ++x) EXPECT_NEAR(wide.at(x + 12, y)[1], frames[1].at(x, y)[1], 1);
+  EXPECT_TRUE(contains(expectUsageError({"render", model(), at("none"), "--path", path, "--split", "all"}), "--views"));
 
   // The same poses in the format of nerfstudio's viewer.
   const std::string moved = writePath("viewer/path.json", false);
@@ -514,6 +521,12 @@ TEST_F(CommandLine, FollowsACameraPath) {
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_NE(readImage(at("flown-elsewhere/00001.png")).image.pixels, frames[1].pixels);
   fs::rename(at("moved.json"), at("viewer/dataparser_transforms.json"));
+  said = run({"render", model(), at("flown-unused"), "--path", moved});
+  EXPECT_TRUE(contains(said.err, "dataparser_transforms.json is not used")) << said.err;
+  EXPECT_NE(readImage(at("flown-unused/00001.png")).image.pixels, frames[1].pixels);
+  std::string written = readTextFile(moved);
+  written.insert(written.find('{') + 1, R"("keyframes": [],)");
+  writeFileAtomically(moved, std::string_view(written));
   said = run({"render", model(), at("flown-beside"), "--path", moved});
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_TRUE(contains(said.err, "dataparser_transforms.json")) << said.err;

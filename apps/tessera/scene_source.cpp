@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "apps/tessera/warning_renderer.h"
 #include "base/error.h"
-#include "base/log.h"
 #include "base/memory.h"
 #include "render/cpu/scene_renderer.h"
 #include "render/tile_scene.h"
@@ -21,41 +21,12 @@
 namespace tessera {
 namespace {
 
-// Warns once when an image was rendered coarser than requested.
 template <class Renderer>
-class WarningRenderer final : public ViewRenderer {
- public:
-  WarningRenderer(const fs::path& folder, const Tileset& tileset, uint64_t budgetBytes,
-                  std::unique_ptr<Renderer> renderer)
-      : folder_(folder),
-        showsOutside_(tessera::showsOutside(tileset)),
-        budgetBytes_(budgetBytes),
-        renderer_(std::move(renderer)) {}
-
-  RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth) override {
-    RenderedView view = renderer_->render(camera, worldFromCamera, opaqueDepth);
-    if (renderer_->choice().refused > 0 && !std::exchange(warned_, true)) {
-      warn("{}: views do not fit into {:.4g} MiB at their finest level and are rendered coarser; raise --memory-mib",
-           folder_.string(), static_cast<double>(budgetBytes_) / 1048576);
-    }
-    return view;
-  }
-  std::string device() const override { return renderer_->device(); }
-  Eigen::Array3f background() const override { return renderer_->background(); }
-  bool showsOutside() const override { return showsOutside_; }
-
- private:
-  fs::path folder_;
-  bool showsOutside_;
-  uint64_t budgetBytes_;
-  std::unique_ptr<Renderer> renderer_;
-  bool warned_ = false;
-};
-
-template <class Renderer>
-std::unique_ptr<ViewRenderer> withWarnings(const fs::path& folder, const Tileset& tileset, uint64_t budgetBytes,
-                                           std::unique_ptr<Renderer> renderer) {
-  return std::make_unique<WarningRenderer<Renderer>>(folder, tileset, budgetBytes, std::move(renderer));
+std::unique_ptr<ViewRenderer> warning(const fs::path& folder, const Tileset& tileset, uint64_t budgetBytes,
+                                      std::unique_ptr<Renderer> renderer) {
+  const Renderer& drawn = *renderer;
+  return withWarnings(folder, budgetBytes, showsOutside(tileset), std::move(renderer),
+                      [&drawn] { return static_cast<size_t>(drawn.choice().refused); });
 }
 
 std::unique_ptr<ViewRenderer> makeSceneRenderer([[maybe_unused]] const Device& device, const fs::path& folder,
@@ -66,14 +37,14 @@ std::unique_ptr<ViewRenderer> makeSceneRenderer([[maybe_unused]] const Device& d
     ofGpu.draw = settings.draw;
     ofGpu.selection = settings.selection;
     ofGpu.budgetBytes = settings.budgetBytes;
-    return withWarnings(folder, tileset, settings.budgetBytes, openGpuScene(context, folder, ofGpu));
+    return warning(folder, tileset, settings.budgetBytes, openGpuScene(context, folder, ofGpu));
   }
 #endif
   TileScene scene = openTileScene(folder, requireCodec(folder, tileset));
   settings.background = Eigen::Array3f(scene.background[0], scene.background[1], scene.background[2]);
-  return withWarnings(folder, tileset, settings.budgetBytes,
-                      std::make_unique<SceneRenderer>(makeCpuDrawer(tileset.representation), scene.frame,
-                                                      std::move(scene.tree), std::move(scene.source), settings));
+  return warning(folder, tileset, settings.budgetBytes,
+                 std::make_unique<SceneRenderer>(makeCpuDrawer(tileset.representation), scene.frame,
+                                                 std::move(scene.tree), std::move(scene.source), settings));
 }
 
 class SceneRenderSource final : public RenderSource {

@@ -54,8 +54,8 @@ void addRunVerb(CLI::App& app) {
   CLI::App* verb =
       app.add_subcommand("run", "a folder of photos, or a video, to a scene: poses, training, baking, evaluation");
   verb->footer(
-      "Run again with the same folders after an interruption: what is finished is kept, and flags that are not given\n"
-      "are those of the run before.\n\n"
+      "Run again with the same folders after an interruption: what is finished is kept, and what is not given of\n"
+      "method, device, length, size, masks, frames and held-out photos is as in the run before.\n\n"
       "Examples:\n  tessera run photos/ place --minutes 10\n  tessera run flight.mp4 place --serve 8080");
   verb->add_option("photos", options->photos,
                    "folder of photos (JPEG, PNG), a video, or photos with poses as `import` reads them")

@@ -2,9 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "apps/tessera/scene_source.h"
+#include "apps/tessera/warning_renderer.h"
 #include "base/error.h"
 #include "base/log.h"
+#include "tiles/scene_folder.h"
 #include "world/main_scene.h"
 #include "world/world_file.h"
 #ifdef TESSERA_HAS_VULKAN
@@ -25,11 +29,27 @@ std::unique_ptr<ViewRenderer> makeWorldRenderer([[maybe_unused]] const Device& d
     settings.selection.finestLevel = options.level;
     settings.budgetBytes =
         options.memoryMiB > 0 ? static_cast<uint64_t>(options.memoryMiB * 1048576) : sceneBudgetBytes(device);
-    return openGpuWorld(context, world, worldFile, settings);
+    std::unique_ptr<WorldRenderer> renderer = openGpuWorld(context, world, worldFile, settings);
+    const WorldRenderer& drawn = *renderer;
+    return withWarnings(worldFile, settings.budgetBytes, drawn.showsOutside(), std::move(renderer),
+                        [&drawn] { return drawn.state().refused; });
   }
 #endif
   throw Error(worldFile.string(), "", "is a world, which is drawn by Vulkan only",
               "use --device vulkan; without a GPU, Mesa's driver for the CPU draws it (mesa-vulkan-drivers)");
+}
+
+// Throws Error if no visible scene has so coarse a level.
+void requireLevel(const fs::path& worldFile, const World& world, int level) {
+  uint32_t coarsest = 0;
+  for (size_t i = 0; level > 0 && i < world.scenes.size(); ++i) {
+    if (!world.scenes[i].isVisible) continue;
+    const fs::path folder = resolveScene(worldFile, world.scenes[i], fmt::format("scenes[{}]", i));
+    coarsest = std::max(coarsest, coarsestLevel(readTileset(folder)));
+  }
+  if (static_cast<uint32_t>(level) > coarsest)
+    throw Error(worldFile.string(), fmt::format("--lod {}", level),
+                fmt::format("the coarsest level of its scenes is {}", coarsest), "name that or a finer one");
 }
 
 class WorldRenderSource final : public RenderSource {
@@ -39,6 +59,7 @@ class WorldRenderSource final : public RenderSource {
     const World world = readWorldFile(worldFile);
     main_ = fmt::format("scenes[{}]", findMainScene(world));
     sourceFromWorld_ = readSourceFromWorld(world, worldFile);
+    requireLevel(worldFile, world, options.level);
     renderer_ = makeWorldRenderer(device, worldFile, world, options);
   }
 

@@ -89,7 +89,8 @@ Place loadPlace(const ViewOptions& options, const std::optional<WorldToView>& wo
           -Vec3d::Ones(), Vec3d::Ones(), [&](const Vec3d& x) { return placement.frame.worldFromScene(x); }, place);
     }
     sourceFromWorld = placement.sourceFromWorld;
-    if (views.empty() && fs::exists(placement.capture / "transforms.json")) views = placement.capture;
+    std::error_code status;
+    if (views.empty() && fs::exists(placement.capture / "transforms.json", status)) views = placement.capture;
   }
   if (views.empty()) return place;
   Capture capture;

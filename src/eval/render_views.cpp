@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "base/check.h"
@@ -13,6 +15,24 @@
 #include "eval/video.h"
 
 namespace tessera {
+namespace {
+
+// `width`, `height`: of the image; 0: those of the camera.
+void requireRenderable(const ViewRenderer& renderer, const NamedView& view, int width, int height) {
+  const Camera& camera = view.camera;
+  if (const std::string reason = renderer.whyNotThrough(camera); !reason.empty())
+    throw Error(view.name, "", reason, "render along a path of perspective, or views of undistorted photos");
+  if (width == 0) return;
+  // One side may be rounded to whole pixels.
+  const double ratio = double{1} * camera.width / camera.height;
+  if (std::abs(height * ratio - width) <= 1 || std::abs(width / ratio - height) <= 1) return;
+  throw Error(
+      view.name, "",
+      fmt::format("is {}x{} pixels large, and would be stretched to {}x{}", camera.width, camera.height, width, height),
+      "give a --size of its shape, or render to a folder, without a --size");
+}
+
+}  // namespace
 
 std::vector<NamedView> viewsOfCapture(const Capture& capture, std::optional<Split> split) {
   std::vector<NamedView> views;
@@ -43,15 +63,26 @@ std::vector<NamedView> viewsOfPath(const CameraPath& path, const Mat4d& sourceFr
   return views;
 }
 
+bool isVideoName(const fs::path& out) {
+  std::string extension = out.extension().string();
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  for (const char* other : {".avi", ".mkv", ".mov", ".webm"})
+    if (extension == other)
+      throw Error(out.string(), "", "is no name of a video that is written", "let it end in .mp4");
+  return extension == ".mp4";
+}
+
 void renderViews(ViewRenderer& renderer, const std::vector<NamedView>& views, const fs::path& out,
                  const RenderViewsOptions& options) {
   CHECK(!views.empty());
   CHECK((options.width > 0) == (options.height > 0));
-  const bool isVideo = out.extension() == ".mp4";
+  const bool isVideo = isVideoName(out);
   int width = options.width, height = options.height;
+  if (isVideo && width == 0) width = views[0].camera.width, height = views[0].camera.height;
+  for (const NamedView& view : views) requireRenderable(renderer, view, width, height);
   std::optional<VideoWriter> video;
   if (isVideo) {
-    if (width == 0) width = views[0].camera.width, height = views[0].camera.height;
     VideoOptions videoOptions;
     videoOptions.width = width;
     videoOptions.height = height;

@@ -31,8 +31,13 @@ struct RenderViewsOptions {
   std::function<void(size_t done)> onView;  // called after each view with the number of views done
 };
 
+// Returns whether `out` names a video (.mp4). Throws Error if it names one of another format, which is not written.
+bool isVideoName(const fs::path& out);
+
 // Renders each view over the renderer's background. `out` is a folder of PNGs, at the relative paths of the photos, or
-// a video if it ends in .mp4, whose frames all have the size of the first view. Throws Error if it cannot be written.
+// a video (isVideoName), whose frames all have the size of the first view. Throws Error if it cannot be written, or,
+// before the first view is rendered, if the renderer cannot draw through the camera of one, or the size would stretch
+// it.
 void renderViews(ViewRenderer& renderer, const std::vector<NamedView>& views, const fs::path& out,
                  const RenderViewsOptions& options);
 

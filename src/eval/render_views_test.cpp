@@ -69,14 +69,49 @@ TEST(RenderViews, CompositesViewsOverTheBackgroundInTheRequestedSize) {
   renderer.colourBehind = {0, 0.5f, 1};
   RenderViewsOptions options;
   options.width = 10;
-  options.height = 6;
+  options.height = 7;  // rounded from 7.5
   const fs::path out = fake.capture.root / "out";
   renderViews(renderer, viewsOfCapture(fake.capture, Split::test), out, options);
   const ImageU8 picture = readImage(out / "a.png").image;
   EXPECT_EQ(picture.width, 10);
-  EXPECT_EQ(picture.height, 6);
+  EXPECT_EQ(picture.height, 7);
   EXPECT_EQ(std::vector<uint8_t>(picture.pixels.begin(), picture.pixels.begin() + 3),
             (std::vector<uint8_t>{64, 128, 191}));
+}
+
+TEST(RenderViews, RefusesSizesThatStretchAndLensesThatCannotBeDrawn) {
+  FakeCapture fake("render_shape");
+  fake.add("a.png", ImageU8(64, 48, 3));
+  fake.add("b.png", ImageU8(64, 48, 3));
+  int rendered = 0;
+  FakeRenderer renderer([&rendered](const Camera& camera, int) {
+    ++rendered;
+    return makeEmptyView(camera);
+  });
+  std::vector<NamedView> views = viewsOfCapture(fake.capture, Split::test);
+  std::swap(views[1].camera.width, views[1].camera.height);
+  const fs::path out = fake.capture.root / "out";
+  const auto refusal = [&](const fs::path& to, const RenderViewsOptions& options) {
+    try {
+      renderViews(renderer, views, to, options);
+    } catch (const Error& error) {
+      return error.subject() + ": " + error.reason();
+    }
+    return std::string();
+  };
+  RenderViewsOptions options;
+  options.width = 32;
+  options.height = 24;
+  EXPECT_EQ(refusal(out, options), "b.png: is 48x64 pixels large, and would be stretched to 32x24");
+  EXPECT_EQ(refusal(fake.capture.root / "all.MP4", {}),
+            "b.png: is 48x64 pixels large, and would be stretched to 64x48");
+  EXPECT_NE(refusal(fake.capture.root / "all.webm", {}), "");
+  renderer.refusal = "has the lens of a fish";
+  EXPECT_EQ(refusal(out, {}), "a.png: has the lens of a fish");
+  EXPECT_EQ(rendered, 0);
+  renderer.refusal.clear();
+  EXPECT_EQ(refusal(out, {}), "");
+  EXPECT_EQ(rendered, 2);
 }
 
 Mat4d similarity(double scale, double angle, const Vec3d& translation) {

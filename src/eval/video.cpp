@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -11,6 +10,7 @@
 #include "base/check.h"
 #include "base/child_process.h"
 #include "base/error.h"
+#include "base/leftovers.h"
 
 namespace tessera {
 namespace {
@@ -55,10 +55,12 @@ VideoWriter::VideoWriter(fs::path path, const VideoOptions& options) : state_(st
   State& state = *state_;
   state.path = std::move(path);
   state.options = options;
-  state.partial = state.path;
-  state.partial += ".partial-" + std::to_string(::getpid());
+  state.partial = partialPlace(state.path);
   std::error_code status;
+  if (fs::is_directory(state.path, status))
+    throw Error(state.path.string(), "", "is a folder, not a file", "name a file to write, or remove the folder");
   if (state.path.has_parent_path()) fs::create_directories(state.path.parent_path(), status);
+  removeLeftovers(state.path);
 
   int ends[2];
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends) != 0) {
@@ -106,9 +108,8 @@ void VideoWriter::finish() {
   std::error_code failure;
   fs::rename(state.partial, state.path, failure);
   if (failure) {
-    state.removePartial();
     throw Error(state.path.string(), "", "could not be written: " + failure.message(),
-                "check the path and its permissions");
+                "rename " + state.partial.string() + ", which is complete, before you render again");
   }
 }
 

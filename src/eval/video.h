@@ -18,7 +18,8 @@ struct VideoOptions {
 };
 
 // Encodes frames as they are added. The file appears under its name when `finish` returns; before that, or without it,
-// there is none. Every function throws Error if the program is missing, or with its messages if it failed.
+// there is none. What a killed process left is removed by the next one. Every function throws Error if the program is
+// missing, or with its messages if it failed.
 class VideoWriter {
  public:
   VideoWriter(fs::path path, const VideoOptions& options);

@@ -54,6 +54,21 @@ TEST_F(Video, IsWrittenAsAnMp4UnderAnUnusualName) {
   EXPECT_NE(bytes.find("avc1"), std::string::npos);
 }
 
+TEST_F(Video, RemovesWhatAKilledProcessLeftAndRefusesAFolder) {
+  if (!hasProgram()) GTEST_SKIP() << "ffmpeg is not installed: encoding is not tested";
+  const std::string ofNoProcess = "flight.mp4.partial-2147483646";
+  writeFileAtomically(folder_ / ofNoProcess, std::string_view("half"));
+  VideoOptions options;
+  options.width = options.height = 16;
+  {
+    VideoWriter writer(folder_ / "flight.mp4", options);
+    EXPECT_FALSE(fs::exists(folder_ / ofNoProcess));
+  }
+  fs::create_directories(folder_ / "folder.mp4");
+  EXPECT_THROW(VideoWriter(folder_ / "folder.mp4", options), Error);
+  EXPECT_EQ(filesLeft(), 1u);
+}
+
 TEST_F(Video, SaysHowToInstallAMissingProgram) {
   VideoOptions options;
   options.width = options.height = 2;

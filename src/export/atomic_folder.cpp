@@ -1,15 +1,12 @@
 #include "export/atomic_folder.h"
 
 #include <fcntl.h>
-#include <signal.h>
 #include <stdio.h>
-#include <unistd.h>
 
 #include <cerrno>
-#include <charconv>
-#include <string_view>
 
 #include "base/error.h"
+#include "base/leftovers.h"
 
 namespace tessera {
 namespace {
@@ -18,37 +15,14 @@ Error couldNot(const fs::path& path, const std::error_code& status) {
   return Error(path.string(), "", "could not be written: " + status.message(), "check free space and permissions");
 }
 
-constexpr const char* kReplaced = "-old";  // ends the name of what is replaced, until that has been done
-
 }  // namespace
-
-void removeLeftovers(const fs::path& place) {
-  const std::string prefix = place.filename().string() + ".partial-";
-  std::error_code ignored;
-  const fs::path parent = place.has_parent_path() ? place.parent_path() : fs::path(".");
-  for (const fs::directory_entry& entry : fs::directory_iterator(parent, ignored)) {
-    const std::string name = entry.path().filename().string();
-    if (!name.starts_with(prefix)) continue;
-    int process = 0;
-    const char* const end = name.data() + name.size();
-    const auto [read, error] = std::from_chars(name.data() + prefix.size(), end, process);
-    const std::string_view rest(read, static_cast<size_t>(end - read));
-    if (error != std::errc() || process <= 0 || !(rest.empty() || rest == kReplaced || rest == kSpooled)) continue;
-    if (::kill(process, 0) == 0 || errno != ESRCH) continue;
-    // Of what was being replaced, nothing else may be left.
-    if (rest == kReplaced && !fs::exists(place, ignored)) {
-      fs::rename(entry.path(), place, ignored);
-    } else {
-      fs::remove_all(entry.path(), ignored);
-    }
-  }
-}
 
 AtomicFolder::AtomicFolder(const fs::path& place, const std::function<bool(const std::string& name)>& isOurs)
     : place_(place.has_filename() ? place : place.parent_path()) {
-  beside_ = place_;
-  beside_ += ".partial-" + std::to_string(::getpid());
   std::error_code status;
+  // Of a symbolic link, what it leads to is replaced.
+  if (const fs::path led = fs::canonical(place_, status); !status) place_ = led;
+  beside_ = partialPlace(place_);
   if (fs::exists(place_, status)) {
     if (!fs::is_directory(place_, status)) {
       throw Error(place.string(), "", "is a file, not a folder", "name a folder to write");

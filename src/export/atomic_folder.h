@@ -8,12 +8,6 @@
 
 namespace tessera {
 
-// Ends the name of a file that holds bytes until they are copied into the one that is written: PLACE.partial-PID-bytes.
-inline constexpr const char* kSpooled = "-bytes";
-
-// Removes what killed processes left next to a file or folder that they were writing: PLACE.partial-PID, and the like.
-void removeLeftovers(const fs::path& place);
-
 class AtomicFolder {
  public:
   // Removes what killed processes left next to `place`. Throws Error if `place` is something that must not be replaced:

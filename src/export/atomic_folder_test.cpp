@@ -48,6 +48,17 @@ TEST_F(AtomicFolderOnDisk, LeavesTheOldOneWhereItIsNotCommitted) {
   EXPECT_EQ(entries(), 1u);
 }
 
+TEST_F(AtomicFolderOnDisk, ReplacesWhatALinkLeadsTo) {
+  write("large disk/old/part1", "1");
+  fs::create_directory_symlink(root_ / "large disk/old", root_ / "link");
+  AtomicFolder folder(root_ / "link", isOurs);
+  writeFileAtomically(folder.path() / "part1", std::string_view("2"));
+  folder.commit();
+  EXPECT_TRUE(fs::is_symlink(root_ / "link"));
+  EXPECT_EQ(readTextFile(root_ / "large disk/old/part1"), "2");
+  EXPECT_EQ(entries(), 2u);
+}
+
 TEST_F(AtomicFolderOnDisk, TakesThePlaceOfAnOlderOne) {
   write("old/part1", "1");
   write("old/part2", "2");

@@ -1,7 +1,5 @@
 #include "export/glb_file.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -9,7 +7,7 @@
 
 #include "base/check.h"
 #include "base/error.h"
-#include "export/atomic_folder.h"
+#include "base/leftovers.h"
 #include "tiles/glb.h"
 
 namespace tessera {
@@ -24,10 +22,11 @@ GlbFile::GlbFile(fs::path place) : place_(std::move(place)) {
   if (fs::is_directory(place_, status))
     throw Error(place_.string(), "", "is a folder, not a file", "name a file to write, or remove the folder");
   if (place_.has_parent_path()) fs::create_directories(place_.parent_path(), status);
+  // Of a symbolic link, what it leads to is replaced.
+  if (const fs::path led = fs::canonical(place_, status); !status) place_ = led;
   removeLeftovers(place_);
-  spool_ = beside_ = place_;
-  beside_ += ".partial-" + std::to_string(::getpid());
-  spool_ += ".partial-" + std::to_string(::getpid()) + kSpooled;
+  spool_ = beside_ = partialPlace(place_);
+  spool_ += kSpooled;
   out_.open(spool_, std::ios::binary | std::ios::trunc);
   if (!out_) fail();
 }

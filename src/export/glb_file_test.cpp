@@ -35,6 +35,16 @@ Bytes makeBytes(std::initializer_list<int> values) {
   return bytes;
 }
 
+TEST_F(GlbFileTest, ReplacesWhatALinkLeadsTo) {
+  writeFileAtomically(root_ / "large disk/old.glb", std::string_view("old"));
+  fs::create_symlink(root_ / "large disk/old.glb", root_ / "a.glb");
+  GlbFile file(root_ / "a.glb");
+  file.addView(makeBytes({1, 2, 3, 4}));
+  const uint64_t size = file.commit({{"asset", {{"version", "2.0"}}}});
+  EXPECT_TRUE(fs::is_symlink(root_ / "a.glb"));
+  EXPECT_EQ(fs::file_size(root_ / "large disk/old.glb"), size);
+}
+
 TEST_F(GlbFileTest, HoldsEachViewAtAMultipleOfFourBytes) {
   GlbFile file(root_ / "a.glb");
   const Bytes first = makeBytes({1, 2, 3, 4, 5}), second = makeBytes({6, 7});

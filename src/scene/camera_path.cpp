@@ -1,5 +1,7 @@
 #include "scene/camera_path.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/SVD>
 #include <array>
 #include <cmath>
@@ -8,6 +10,7 @@
 
 #include "base/error.h"
 #include "base/log.h"
+#include "base/text_place.h"
 
 namespace tessera {
 namespace {
@@ -57,12 +60,61 @@ std::optional<Mat3d> rotationFrom(const Mat3d& given) {
   return Mat3d(svd.matrixU() * svd.matrixV().transpose());
 }
 
-std::optional<Pose> poseFrom(const json& value) {
-  const auto matrix = matrixFrom(value, 4);
-  if (!matrix) return std::nullopt;
+// Parses a text. Returns null, and sets the flaw, if it is not JSON.
+json parsed(std::string_view text, TextFlaw& flaw) {
+  try {
+    return json::parse(text);
+  } catch (const json::parse_error& error) {
+    flaw = {placeInText(text, error.byte), "is not JSON"};
+  } catch (const json::out_of_range&) {
+    flaw = {"", "contains a number that is too large"};
+  }
+  return {};
+}
+
+// Throws TextFlaw.
+double requireNumber(const json& object, const std::string& of, const char* key, double absent, double low,
+                     double high) {
+  const auto number = finiteNumber(object, key, absent);
+  if (number && *number >= low && *number <= high) return *number;
+  throw TextFlaw{of + key, fmt::format("is not a number from {} to {}", low, high)};
+}
+
+// Throws TextFlaw.
+Pose requirePose(const json& frame, const std::string& place) {
+  const auto entry = frame.find("camera_to_world");
+  if (entry == frame.end()) throw TextFlaw{place, "has no camera_to_world"};
+  const auto matrix = matrixFrom(*entry, 4);
+  if (!matrix) throw TextFlaw{place + ".camera_to_world", "is not 16 numbers, in rows"};
   const auto rotation = rotationFrom(matrix->topLeftCorner<3, 3>());
-  if (!rotation) return std::nullopt;
-  return Pose{flippedYz(*rotation), matrix->topRightCorner<3, 1>()};
+  if (!rotation)
+    throw TextFlaw{place + ".camera_to_world", "does not begin with a rotation: it scales, shears or mirrors"};
+  return {flippedYz(*rotation), matrix->topRightCorner<3, 1>()};
+}
+
+// Throws TextFlaw.
+CameraPath requirePath(const json& file) {
+  if (!file.is_object()) throw TextFlaw{"", "is not an object of JSON"};
+  CameraPath path;
+  path.width = static_cast<int>(std::lround(requireNumber(file, "", "render_width", path.width, 1, kLargestSide)));
+  path.height = static_cast<int>(std::lround(requireNumber(file, "", "render_height", path.height, 1, kLargestSide)));
+  path.framesPerSecond = requireNumber(file, "", "fps", path.framesPerSecond, 1e-3, 1000);
+  path.seconds = requireNumber(file, "", "seconds", 0, 0, 1e9);
+  if (const auto type = file.find("camera_type"); type != file.end()) {
+    if (*type != "perspective" && *type != "fisheye")
+      throw TextFlaw{"camera_type", "is neither perspective nor fisheye, which alone are rendered"};
+    path.fisheye = *type == "fisheye";
+  }
+  path.fromViewer = file.contains("keyframes");
+  const auto views = file.find("camera_path");
+  if (views == file.end() || !views->is_array() || views->empty())
+    throw TextFlaw{"camera_path", "is missing, empty, or not a list of frames"};
+  for (const json& item : *views) {
+    const std::string place = fmt::format("camera_path[{}]", path.views.size());
+    if (!item.is_object()) throw TextFlaw{place, "is not an object"};
+    path.views.push_back({requirePose(item, place), requireNumber(item, place + ".", "fov", 50, 0.1, 179)});
+  }
+  return path;
 }
 
 }  // namespace
@@ -78,41 +130,16 @@ Camera CameraPath::makeViewCamera(const CameraPathView& view) const {
   return camera;
 }
 
-std::optional<CameraPath> decodeCameraPath(std::string_view text) {
-  const json file = json::parse(text, nullptr, false);
-  if (!file.is_object()) return std::nullopt;
-  CameraPath path;
-  const auto width = finiteNumber(file, "render_width", path.width);
-  const auto height = finiteNumber(file, "render_height", path.height);
-  const auto rate = finiteNumber(file, "fps", path.framesPerSecond);
-  const auto seconds = finiteNumber(file, "seconds", 0);
-  if (!width || !height || !rate || !seconds) return std::nullopt;
-  if (*width < 1 || *height < 1 || *width > kLargestSide || *height > kLargestSide) return std::nullopt;
-  if (*rate <= 0 || *rate > 1000 || *seconds < 0) return std::nullopt;
-  path.width = static_cast<int>(std::lround(*width));
-  path.height = static_cast<int>(std::lround(*height));
-  path.framesPerSecond = *rate;
-  path.seconds = *seconds;
-
-  if (const auto type = file.find("camera_type"); type != file.end()) {
-    if (!type->is_string()) return std::nullopt;
-    const auto& name = type->get_ref<const std::string&>();
-    if (name != "perspective" && name != "fisheye") return std::nullopt;
-    path.fisheye = name == "fisheye";
+std::optional<CameraPath> decodeCameraPath(std::string_view text, TextFlaw* flaw) {
+  TextFlaw why;
+  try {
+    const json file = parsed(text, why);
+    if (why.reason.empty()) return requirePath(file);
+  } catch (TextFlaw& thrown) {
+    why = std::move(thrown);
   }
-  path.fromViewer = file.contains("keyframes");
-  const auto views = file.find("camera_path");
-  if (views == file.end() || !views->is_array() || views->empty()) return std::nullopt;
-  for (const json& item : *views) {
-    if (!item.is_object()) return std::nullopt;
-    const auto matrix = item.find("camera_to_world");
-    if (matrix == item.end()) return std::nullopt;
-    const auto pose = poseFrom(*matrix);
-    const auto angle = finiteNumber(item, "fov", 50);
-    if (!pose || !angle || *angle < 0.1 || *angle > 179) return std::nullopt;
-    path.views.push_back({*pose, *angle});
-  }
-  return path;
+  if (flaw != nullptr) *flaw = std::move(why);
+  return std::nullopt;
 }
 
 std::optional<Mat4d> decodeDataparserTransforms(std::string_view text) {
@@ -141,17 +168,23 @@ Mat4d readDataparserTransforms(const fs::path& path) {
 }
 
 CameraPath readCameraPath(const fs::path& path, const fs::path& dataparserTransforms) {
-  auto decoded = decodeCameraPath(readTextFile(path));
+  TextFlaw flaw;
+  auto decoded = decodeCameraPath(readTextFile(path), &flaw);
   if (!decoded) {
-    throw Error(path.string(), "", "is not a camera path that can be followed",
-                "export it from nerfstudio's viewer as perspective or fisheye, with at least one frame");
+    throw Error(path.string(), flaw.place, flaw.reason,
+                "correct it, or export the path again from a viewer (tessera's or nerfstudio's)");
   }
   std::error_code status;
   fs::path transforms = dataparserTransforms;
   if (const fs::path beside = path.parent_path() / "dataparser_transforms.json";
       transforms.empty() && fs::exists(beside, status)) {
-    transforms = beside;
-    inform("{}: followed in the world of {}", path.string(), beside.string());
+    if (decoded->fromViewer) {
+      transforms = beside;
+      inform("{}: followed in the world of {}", path.string(), beside.string());
+    } else {
+      inform("{}: nerfstudio's viewer did not write it, so that {} is not used; --dataparser-transforms would use it",
+             path.string(), beside.string());
+    }
   }
   if (!transforms.empty()) {
     decoded->pathFromSource = readDataparserTransforms(transforms);

@@ -17,6 +17,11 @@
 
 namespace tessera {
 
+// Why a text is refused: a line and column, or a key, and what is wrong there.
+struct TextFlaw {
+  std::string place, reason;
+};
+
 struct CameraPathView {
   Pose worldFromCamera;             // in the world of the file, with camera axes converted to those of scene/axes.h
   double verticalFieldOfView = 50;  // degrees
@@ -41,7 +46,8 @@ struct CameraPath {
 // of bounds (sides of 1 to 16384 pixels, fields of view between 0 and 180 degrees), a matrix is not a rotation, there
 // are no frames, or the camera type has no lens model here (equirectangular). Unknown keys are ignored; a missing size,
 // frame rate or duration takes nerfstudio's default.
-std::optional<CameraPath> decodeCameraPath(std::string_view text);
+// `flaw`: optional; where and why the text was refused.
+std::optional<CameraPath> decodeCameraPath(std::string_view text, TextFlaw* flaw = nullptr);
 
 // Decodes the text of a dataparser_transforms.json, {"transform": 3×4, "scale": s}. Returns the similarity
 // x ↦ s · (transform · x) from the world of the source, before what transforms.json calls applied_transform, to the
@@ -51,8 +57,8 @@ std::optional<Mat4d> decodeDataparserTransforms(std::string_view text);
 Mat4d readDataparserTransforms(const fs::path& path);  // throws Error naming the path
 
 // Reads a camera path, with `pathFromSource` from the named dataparser_transforms.json or, where none is named, from
-// the one in the folder of `path` if it exists. Warns if the path comes from the viewer and there is no such file.
-// Throws Error naming the file that cannot be read or decoded.
+// the one in the folder of `path`, if nerfstudio's viewer wrote the path and the file exists; warns if it does not
+// exist. Throws Error naming the file, and the place in it, that cannot be read or decoded.
 CameraPath readCameraPath(const fs::path& path, const fs::path& dataparserTransforms = {});
 
 std::string encodeCameraPath(const CameraPath& path);

@@ -114,6 +114,23 @@ TEST(CameraPath, RejectsInvalidPaths) {
   }
 }
 
+TEST(CameraPath, SaysWhereAndWhyItIsRefused) {
+  const std::string frame = R"({"camera_to_world": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1])";
+  const auto describeFlaw = [](const std::string& text) {
+    TextFlaw flaw;
+    EXPECT_FALSE(decodeCameraPath(text, &flaw));
+    return flaw.place + ": " + flaw.reason;
+  };
+  EXPECT_EQ(describeFlaw("{\n  \"fps\": 24,\n  oops"), "line 3, column 3: is not JSON");
+  EXPECT_EQ(describeFlaw(withFrame(frame + "}, " + frame + R"(, "fov": 0})")),
+            "camera_path[1].fov: is not a number from 0.1 to 179");
+  EXPECT_EQ(describeFlaw(withFrame(R"({"camera_to_world": [2,0,0,0, 0,2,0,0, 0,0,2,0, 0,0,0,1]})")),
+            "camera_path[0].camera_to_world: does not begin with a rotation: it scales, shears or mirrors");
+  EXPECT_EQ(describeFlaw(R"({"camera_type": "equirectangular"})"),
+            "camera_type: is neither perspective nor fisheye, which alone are rendered");
+  EXPECT_EQ(describeFlaw("{}"), "camera_path: is missing, empty, or not a list of frames");
+}
+
 // A file as nerfstudio writes it for a capture whose poses were rotated from COLMAP's axes.
 constexpr const char* kTransforms =
     R"({"transform": [[0, 1, 0, 0.5], [1, 0, 0, -0.25], [0, 0, -1, 2]], "scale": 0.125})";
@@ -157,6 +174,10 @@ TEST(CameraPath, UsesTheNamedOrNeighbouringDataparserTransforms) {
   const std::string other = R"({"transform": [[1,0,0,0],[0,1,0,0],[0,0,1,0]], "scale": 4})";
   writeFileAtomically(folder / "named.json", other);
   EXPECT_EQ(readCameraPath(file, folder / "named.json").pathFromSource, *decodeDataparserTransforms(other));
+  // A path of tessera's viewer is in the world of the capture.
+  const std::string ours = withFrame(R"({"camera_to_world": [1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]})");
+  writeFileAtomically(folder / "ours.json", ours);
+  EXPECT_EQ(readCameraPath(folder / "ours.json").pathFromSource, Mat4d::Identity());
   writeFileAtomically(beside, std::string_view("{}"));
   try {
     readCameraPath(file);

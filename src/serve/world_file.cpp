@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "base/text_place.h"
 #include "serve/http_request.h"
 #include "serve/site_file.h"
 
@@ -40,16 +41,6 @@ std::optional<std::string> pathOfScene(const std::string& url) {
   return path->substr(1);
 }
 
-// Returns the line and column of the last of the first `bytes` bytes. A multi-byte character is one column.
-std::string placeIn(const std::string& text, size_t bytes) {
-  const std::string before = text.substr(0, bytes > 0 ? bytes - 1 : 0);
-  const auto lines = std::count(before.begin(), before.end(), '\n');
-  const size_t lineBegin = before.rfind('\n') + 1;  // 0 where there is none
-  const auto letters = std::count_if(before.begin() + static_cast<std::ptrdiff_t>(lineBegin), before.end(),
-                                     [](char c) { return (static_cast<unsigned char>(c) & 0xc0) != 0x80; });
-  return fmt::format("line {}, column {}", lines + 1, letters + 1);
-}
-
 // Returns the value of a field, or null if the object does not have it.
 const json& fieldOrNull(const json& object, const char* key) {
   static const json kNone;
@@ -58,15 +49,12 @@ const json& fieldOrNull(const json& object, const char* key) {
 }
 
 json readWorld(const fs::path& file) {
-  const auto withoutFiles = [](int depth, json::parse_event_t event, json& parsed) {
-    return !(depth == 1 && event == json::parse_event_t::key && parsed == "files");
-  };
   const std::string text = readTextFile(file, kMaxBytes);
   json world;
   try {
-    world = json::parse(text, withoutFiles);
+    world = json::parse(text);
   } catch (const json::parse_error& error) {
-    throw Error(file.string(), placeIn(text, error.byte), "is not JSON", kCorrect);
+    throw Error(file.string(), placeInText(text, error.byte), "is not JSON", kCorrect);
   } catch (const json::out_of_range&) {
     throw Error(file.string(), "", "contains a number that is too large", kCorrect);
   }

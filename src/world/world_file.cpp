@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "base/error.h"
+#include "base/text_place.h"
 #include "tiles/json_fields.h"
 #include "world/world_text.h"
 

@@ -1,7 +1,5 @@
 #include "world/world_text.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -109,13 +107,6 @@ std::optional<Bytes> decodeDataUri(std::string_view address) {
   if (!isDataUri(address) || comma == std::string_view::npos) return std::nullopt;
   if (!address.substr(0, comma).ends_with(base64)) return std::nullopt;
   return decodeBase64(address.substr(comma + 1));
-}
-
-std::string placeInText(std::string_view text, size_t bytes) {
-  const std::string_view before = text.substr(0, bytes > 0 ? bytes - 1 : 0);
-  const size_t lineBegin = before.rfind('\n') + 1;  // 0 where there is none
-  return fmt::format("line {}, column {}", std::count(before.begin(), before.end(), '\n') + 1,
-                     before.size() - lineBegin + 1);
 }
 
 }  // namespace tessera

@@ -1,4 +1,4 @@
-// Texts in world.json: addresses, base64, places for errors.
+// Texts in world.json: addresses, base64.
 #pragma once
 
 #include <optional>
@@ -24,7 +24,5 @@ std::optional<Bytes> decodeBase64(std::string_view text);
 bool isDataUri(std::string_view address);
 // Returns the content of an address that states it (data:…;base64,…); nothing if it is not base64.
 std::optional<Bytes> decodeDataUri(std::string_view address);
-// Returns the line and column of the last of the first `bytes` bytes, counted in bytes.
-std::string placeInText(std::string_view text, size_t bytes);
 
 }  // namespace tessera

@@ -105,6 +105,12 @@ GpuSurroundings WorldRenderer::surroundingsAt(const std::vector<size_t>& farthes
   return around;
 }
 
+std::string WorldRenderer::whyNotThrough(const Camera& camera) const {
+  return models_ && !isPinhole(camera.lens)
+             ? fmt::format("has the lens {}, and models of a world are drawn without distortion", lensName(camera.lens))
+             : "";
+}
+
 void WorldRenderer::ensureCapacity(const Camera& camera) {
   width_ = camera.width;
   height_ = camera.height;

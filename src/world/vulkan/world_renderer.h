@@ -32,6 +32,7 @@ class WorldRenderer final : public GpuViewRenderer {
 
   // The depth is that of the nearest surface. Throws Error if there are models and the camera is no pinhole.
   RenderedView render(const Camera& camera, const Pose& worldFromCamera, const ImageF* opaqueDepth = nullptr) override;
+  std::string whyNotThrough(const Camera& camera) const override;
   GpuRenderedView draw(const Camera& camera, const Pose& worldFromCamera) override;
   bool hasMore() const override;
   Pixel pixelAt(int x, int y) override;
