@@ -10,6 +10,7 @@
 #include <fstream>
 
 #include "base/error.h"
+#include "base/leftovers.h"
 
 namespace tessera {
 namespace {
@@ -77,8 +78,7 @@ void writeFileAtomically(const fs::path& path, std::span<const std::byte> bytes,
   // A pipe or a device (/dev/stdout) is written to directly, because a rename would replace it.
   const bool isStream =
       fs::exists(path, status) && !fs::is_regular_file(path, status) && !fs::is_directory(path, status);
-  fs::path partial = path;
-  if (!isStream) partial += ".partial-" + std::to_string(::getpid());
+  const fs::path partial = isStream ? path : partialPlace(path);
   const int file = ::open(partial.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
   if (file < 0) {
     if (ofFolder) errno = ofFolder.value();  // why its folder is not there

@@ -69,15 +69,6 @@ void limitToOpaque(std::optional<ImageU8>& mask, const ImageF& opacity) {
   }
 }
 
-// What the background adds to each pixel of the view.
-ImageF backgroundBehind(const RenderedView& view, const Eigen::Array3f& background) {
-  ImageF behind(view.colour.width, view.colour.height, 3);
-  for (size_t p = 0; p < behind.pixelCount(); ++p) {
-    for (int c = 0; c < 3; ++c) behind.pixels[3 * p + c] = (1 - view.opacity.pixels[p]) * background[c];
-  }
-  return behind;
-}
-
 // Returns the argmin over g of Σ (g·colour + behind − photo)² on the left half, per channel.
 std::array<double, 3> fittedGain(const ImageF& colour, const ImageF& behind, const ImageF& photo, const ImageU8* mask) {
   std::array<double, 3> gain = {1, 1, 1};

@@ -1,12 +1,11 @@
 #include "import/photo_files.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 
 #include "base/error.h"
 #include "base/image_io.h"
+#include "base/leftovers.h"
 #include "base/log.h"
 
 namespace tessera {
@@ -15,8 +14,7 @@ namespace {
 void linkOrCopy(const fs::path& source, const fs::path& target) {
   std::error_code status;
   fs::create_directories(target.parent_path(), status);
-  fs::path partial = target;
-  partial += ".partial-" + std::to_string(::getpid());
+  const fs::path partial = partialPlace(target);
   fs::remove(partial, status);
   // Of a symbolic link, its file: a link to a symbolic link would be another one.
   const fs::path file = fs::canonical(source, status);

@@ -23,12 +23,19 @@ inline RenderedView makeEmptyView(const Camera& camera) {
           ImageF(camera.width, camera.height, 1)};
 }
 
+// Returns what a background colour adds to each pixel of the view: 3 channels.
+inline ImageF backgroundBehind(const RenderedView& view, const Eigen::Array3f& background) {
+  ImageF behind(view.opacity.width, view.opacity.height, 3);
+  for (size_t p = 0; p < behind.pixelCount(); ++p) {
+    for (int c = 0; c < 3; ++c) behind.pixels[3 * p + c] = (1 - view.opacity.pixels[p]) * background[c];
+  }
+  return behind;
+}
+
 // Composites the view over a background colour. Returns the final image: 3 channels, opaque.
 inline ImageF compositeOver(const RenderedView& view, const Eigen::Array3f& background) {
-  ImageF image = view.colour;
-  for (size_t p = 0; p < image.pixelCount(); ++p) {
-    for (int c = 0; c < 3; ++c) image.pixels[3 * p + c] += (1 - view.opacity.pixels[p]) * background[c];
-  }
+  ImageF image = backgroundBehind(view, background);
+  for (size_t i = 0; i < image.pixels.size(); ++i) image.pixels[i] += view.colour.pixels[i];
   return image;
 }
 
