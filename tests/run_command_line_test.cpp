@@ -104,7 +104,12 @@ TEST_F(RunCommandLine, TakesPhotosFromAVideo) {
     arguments.insert(arguments.end(), more.begin(), more.end());
     return Program(folder_.path(), arguments).wait();
   };
-  Said said = run({});
+  Said said = Program(folder_.path(), {"run", video.string(), (folder_ / "out").string(), "--dry-run"}).wait();
+  EXPECT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "frames ")) << said.out;
+  EXPECT_FALSE(contains(said.out, "features")) << said.out << "is not known yet";
+  EXPECT_TRUE(contains(said.err, "the stages after `frames` take is known when the frames are there")) << said.err;
+  said = run({});
   ASSERT_EQ(said.exitCode, 0) << said.err;
   EXPECT_TRUE(contains(said.out, "12 frames of a video of 3.0 s")) << said.out;
   EXPECT_TRUE(contains(said.out, "12 photos, 0 with GPS, 0 left out; 1 cameras, 1 flights")) << said.out;
@@ -157,7 +162,10 @@ TEST_F(RunCommandLine, ServesTheSceneWhenItHasEnded) {
 
 TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {
   SKIP_WITHOUT_SHARED_DATA("brighton_beach");
-  if (!isInPath("colmap")) GTEST_SKIP() << "colmap is not installed";
+  if (!isInPath("colmap")) {
+    ASSERT_FALSE(sharedDataIsRequired()) << "colmap is not installed";
+    GTEST_SKIP() << "colmap is not installed";
+  }
   // Two names that would confuse COLMAP's lists.
   const char* names[] = {"a b/DJI_0018.JPG", "a b/DJI 0019.JPG", "DJI_0020.JPG", "DJI_0021.JPG"};
   for (int i = 0; i < 4; ++i) {
@@ -180,6 +188,22 @@ TEST_F(RunCommandLine, FindsThePosesOfRealPhotos) {
   EXPECT_EQ(said.exitCode, 0) << said.err;
   EXPECT_TRUE(contains(said.out, "mapping    finished before")) << said.out;
   EXPECT_EQ(fs::last_write_time(folder_ / "out/poses/sparse/0/images.bin"), timeOfModel);
+
+  // And so to a scene of which a photo is held out.
+  const std::vector<std::string> onwards = {"--method", "volume", "--steps", "2", "--holdout", "every:4"};
+  said = run(onwards);
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "adjusting  finished before")) << said.out;
+  EXPECT_TRUE(contains(said.err, "to watch the training: tail -f")) << said.err;
+  EXPECT_TRUE(contains(said.out, "held-out PSNR ")) << said.out;
+  EXPECT_TRUE(contains(readTextFile(folder_ / "out/report.html"), "<b>4</b><span class=\"quiet\">photos in the scene"));
+  // Another program trains the model on.
+  fs::copy_file(folder_ / "out/model/manifest.json", folder_ / "manifest.json");
+  writeFileAtomically(folder_ / "out/model/manifest.json", readTextFile(folder_ / "manifest.json") + "\n");
+  said = run({"--until", "bake"});
+  ASSERT_EQ(said.exitCode, 0) << said.err;
+  EXPECT_TRUE(contains(said.out, "train      finished before")) << said.out;
+  EXPECT_FALSE(contains(said.out, "bake       finished before")) << said.out;
 }
 
 }  // namespace

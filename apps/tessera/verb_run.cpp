@@ -90,9 +90,10 @@ void addRunVerb(CLI::App& app) {
           "photos held out for evaluation: every:N, list:FILE, none, or auto: the split of a source with poses, "
           "else every:8")
       ->capture_default_str();
-  CLI::Option* dryRun =
-      verb->add_flag("--dry-run", options->dryRun,
-                     "only state the time, memory and disk of each stage, after features and matches of five photos");
+  CLI::Option* dryRun = verb->add_flag(
+      "--dry-run", options->dryRun,
+      "only state the time, memory and disk of each stage, after features and matches of five photos if there "
+      "are at least 15");
   verb->add_option("--from", options->range.from, "run this stage and all after it again");
   CLI::Option* until = verb->add_option("--until", options->range.until, "the last stage to run");
   auto device = std::make_shared<DeviceOptions>();

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <string>
+#include <vector>
 
 namespace tessera {
 
@@ -19,5 +20,19 @@ template <class... Args>
 void inform(fmt::format_string<Args...> format, Args&&... args) {
   logInfo(fmt::format(format, std::forward<Args>(args)...));
 }
+
+// Keeps the texts of the first kMaxRecorded warnings that any thread gives while it exists. There is at most one at a
+// time.
+class WarningRecorder {
+ public:
+  static constexpr size_t kMaxRecorded = 20;
+
+  WarningRecorder();
+  ~WarningRecorder();
+  WarningRecorder(const WarningRecorder&) = delete;
+  WarningRecorder& operator=(const WarningRecorder&) = delete;
+
+  std::vector<std::string> texts() const;
+};
 
 }  // namespace tessera

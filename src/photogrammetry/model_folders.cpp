@@ -82,8 +82,13 @@ void replaceFolder(const fs::path& newFolder, const fs::path& target) {
   const fs::path before = fs::path(target) += ".before";
   std::error_code status;
   fs::remove_all(before, status);
-  if (fs::exists(target, status)) fs::rename(target, before, status);
-  fs::rename(newFolder, target, status);
+  const bool hasTarget = fs::exists(target, status);
+  if (hasTarget) fs::rename(target, before, status);
+  if (!status) {
+    fs::rename(newFolder, target, status);
+    std::error_code ignored;
+    if (status && hasTarget) fs::rename(before, target, ignored);
+  }
   if (status) throw Error(target.string(), "", "cannot be written: " + status.message(), "check the disk");
   fs::remove_all(before, status);
 }

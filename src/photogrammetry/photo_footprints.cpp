@@ -138,6 +138,13 @@ std::vector<PhotoFootprint> photoFootprints(const PhotoList& list, const std::ve
   return prints;
 }
 
+std::vector<bool> tellFootprints(const PhotoList& list) {
+  std::vector<bool> tell = tellPlaces(list);
+  for (const PhotoFootprint& print : photoFootprints(list, tell))
+    if (print.places.empty()) tell[static_cast<size_t>(print.photo)] = false;
+  return tell;
+}
+
 namespace {
 
 // Returns the largest group of footprints that overlap with one another, directly or by way of others.

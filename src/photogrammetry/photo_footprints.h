@@ -27,6 +27,9 @@ struct PhotoFootprint {
 // that has lost its satellites, unless the gimbal or the barometer tells more.
 std::vector<bool> tellPlaces(const PhotoList& list);
 
+// Whether each photo's tags tell what it shows of the ground: its place does, unless it looks above the horizon.
+std::vector<bool> tellFootprints(const PhotoList& list);
+
 // Returns the footprints of the photos whose GPS tells their places, in their order; of photos without gimbal angles as
 // if they looked straight down. Heights above the ground that are not known are those of the other photos, or follow
 // from the distances of the photos; those that are known count for at least what a survey with little overlap has.

@@ -100,9 +100,14 @@ void findFlights(PhotoList& list) {
   std::vector<size_t> order(list.photos.size());
   for (size_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto folder = [&](size_t i) { return fs::path(list.photos[i].name).parent_path().string(); };
+  // Zoom, and pictures that are upright, begin no flight.
   const auto group = [&](size_t i) {
     const ListedPhoto& photo = list.photos[i];
-    return std::tuple(photo.body, photo.tags.takenAt.has_value(), photo.tags.takenAt ? std::string() : folder(i));
+    const CameraBody& body = list.bodies[static_cast<size_t>(photo.body)];
+    const CameraTags& camera = photo.tags.camera;
+    return std::tuple(camera.make, camera.model, camera.serial, camera.lens, std::max(body.width, body.height),
+                      std::min(body.width, body.height), photo.tags.takenAt.has_value(),
+                      photo.tags.takenAt ? std::string() : folder(i));
   };
   std::stable_sort(order.begin(), order.end(), [&](size_t a, size_t b) {
     return std::tuple(group(a), list.photos[a].tags.takenAt.value_or(0)) <
@@ -143,7 +148,6 @@ double focalLengthInPixels(const CameraTags& camera, int width, int height) {
   return plausible(camera.focalLength * camera.pixelsPerMillimetre * longSide / camera.recordedPixels);
 }
 
-// Only such names can be stored in a capture.
 bool isUtf8(const std::string& name) {
   try {
     nlohmann::json(name).dump();

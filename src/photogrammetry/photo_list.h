@@ -22,8 +22,10 @@ struct ListedPhoto {
   std::string name;      // path below the folder, with '/'
   std::string safeName;  // unique, without folders and blanks, for programs that such names confuse
   fs::path file;
-  int body = 0;    // index into PhotoList::bodies
-  int flight = 0;  // photos of one body without a long pause between them, or in one folder if times are unknown
+  int body = 0;  // index into PhotoList::bodies
+  // Photos of one size by one lens on one camera, at any focal length, without a long pause between them, or in one
+  // folder if times are unknown.
+  int flight = 0;
   PhotoTags tags;
   fs::path mask = {};  // black where the photo is not used (photo_masks.h); empty: none
 };
@@ -48,6 +50,9 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool);
 
 // Whether this is the name of a picture that is read: JPEG or PNG.
 bool isPhotoName(const fs::path& path);
+
+// Whether a name is UTF-8: only such names can be stored in a capture.
+bool isUtf8(const std::string& name);
 
 // Warns of the photos, once for each reason.
 void warnLeftOut(const std::vector<LeftOutPhoto>& photos);

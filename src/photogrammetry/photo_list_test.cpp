@@ -113,6 +113,18 @@ TEST_F(PhotoLists, SeparateFlightsByPauses) {
   EXPECT_NEAR(list.bodies[0].focalLength, 28.0 / 36 * 8, 1e-9);
 }
 
+TEST_F(PhotoLists, CountZoomAndUprightPicturesToTheSameFlight) {
+  for (int i = 0; i < 6; ++i) {
+    const bool isUpright = i == 2;
+    const ExifFields exif{.focalLength35 = 28.0 + 10 * (i % 3), .seconds = 3.0 * i};
+    writeFileAtomically(folder_ / ("p" + std::to_string(i) + ".jpg"),
+                        encodeJpeg(ImageU8(isUpright ? 6 : 8, isUpright ? 8 : 6, 3), 90, encodeExif(exif)));
+  }
+  const PhotoList list = this->list();
+  EXPECT_EQ(list.bodies.size(), 4u);
+  EXPECT_EQ(list.flights, 1);
+}
+
 TEST_F(PhotoLists, RefuseAFolderThatIsNotThere) {
   ThreadPool pool(1);
   EXPECT_THROW(listPhotos(folder_ / "none", pool), Error);

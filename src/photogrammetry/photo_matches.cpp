@@ -39,10 +39,15 @@ bool isTruncated(const fs::path& file) {
 
 }  // namespace
 
+int64_t extractedPixels(const CameraBody& body) {
+  constexpr double kLongest = 3200;
+  const double factor = std::min(1.0, kLongest / std::max(body.width, body.height));
+  return std::max(int64_t{1}, static_cast<int64_t>(factor * body.width * factor * body.height));
+}
+
 int64_t extractionBytes(int threads, int64_t pixels) {
-  // COLMAP reduces photos to a longer side of 3200 pixels, and takes about 370 bytes for each pixel (measured).
-  constexpr int64_t kMaxPixels = 3200 * 3200, kBytesPerPixel = 370;
-  return threads * kBytesPerPixel * std::clamp(pixels, int64_t{1}, kMaxPixels);
+  constexpr int64_t kBytesPerPixel = 370;  // about, measured
+  return threads * kBytesPerPixel * std::max(pixels, int64_t{1});
 }
 
 int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes) {
@@ -94,7 +99,7 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
   const auto count = static_cast<int64_t>(list_.photos.size());
   if (done() < count) {
     int64_t pixels = 0;
-    for (const CameraBody& body : list_.bodies) pixels = std::max(pixels, int64_t{body.width} * body.height);
+    for (const CameraBody& body : list_.bodies) pixels = std::max(pixels, extractedPixels(body));
     const int threads = extractionThreads(settings_.threads, pixels, usableMemoryBytes());
     std::vector<std::string> arguments{"feature_extractor",
                                        "--database_path",
@@ -119,7 +124,7 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
   }
 }
 
-LookAlikes PhotoMatches::findLookAlikes(const Watch& watch) {
+LookAlikes PhotoMatches::findLookAlikes(const std::vector<int>& photos, const Watch& watch) {
   // More words and photos make it slower than they improve it: a city of 202 photos takes a minute and a half of two
   // cores.
   constexpr int64_t kFeaturesPerWord = 40, kMinWords = 64, kMaxWords = 4096;
@@ -142,11 +147,18 @@ LookAlikes PhotoMatches::findLookAlikes(const Watch& watch) {
     if (status) throw Error(words.string(), "", "cannot be made: " + status.message(), "check the disk");
   }
   fs::remove(log, status);
-  runColmap(
-      "look_alikes",
-      {"vocab_tree_retriever", "--database_path", database().string(), "--vocab_tree_path", words.string(),
-       "--num_images", std::to_string(kMaxLookAlikes + 1), "--max_num_features", std::to_string(kFeaturesOfPhoto)},
-      [&] { watch(0); });
+  const fs::path queries = folder_ / "queries.txt";
+  std::string text;
+  const std::map<int, int> features = ColmapDatabase(database()).features();
+  for (const int photo : photos)
+    if (features.contains(photo)) text += list_.photos[static_cast<size_t>(photo)].safeName + "\n";
+  if (text.empty()) return LookAlikes(list_.photos.size());
+  writeFileAtomically(queries, text);
+  runColmap("look_alikes",
+            {"vocab_tree_retriever", "--database_path", database().string(), "--vocab_tree_path", words.string(),
+             "--query_image_list_path", queries.string(), "--num_images", std::to_string(kMaxLookAlikes + 1),
+             "--max_num_features", std::to_string(kFeaturesOfPhoto)},
+            [&] { watch(0); });
   return parseLookAlikes(readTextFile(log), list_);
 }
 

@@ -12,8 +12,10 @@
 
 namespace tessera {
 
-// Returns how many of `threads` (0: all of the machine's) can extract features of photos of so many pixels at once, in
-// so many bytes of memory: at least one.
+// Returns the pixels of a photo in which COLMAP looks for features: it reduces larger photos first.
+int64_t extractedPixels(const CameraBody& body);
+// Returns how many of `threads` (0: all of the machine's) can extract features in so many pixels at once, in so many
+// bytes of memory: at least one.
 int extractionThreads(int threads, int64_t pixels, int64_t memoryBytes);
 // Returns the memory that so many of them take, in bytes.
 int64_t extractionBytes(int threads, int64_t pixels);
@@ -32,8 +34,8 @@ class PhotoMatches {
   void extractFeatures(const Watch& watch);
   // Removes features and matches, which belong to other photos. Throws Error if a file cannot be removed.
   void discard() const;
-  // Returns for each photo those that look like it. Features must have been extracted.
-  LookAlikes findLookAlikes(const Watch& watch);
+  // Returns for each of these photos those that look like it, and for others none. Features must have been extracted.
+  LookAlikes findLookAlikes(const std::vector<int>& photos, const Watch& watch);
   void discardMatches() const;
   // Compares pairs that have not been compared yet.
   void match(const std::vector<PhotoPair>& pairs, const Watch& watch);

@@ -107,9 +107,12 @@ TEST(ColmapDatabase, IsRefusedIfItIsSomethingElse) {
 TEST(PhotoMatches, TakeAsManyThreadsAsMemoryAllows) {
   constexpr int64_t kGiB = int64_t{1} << 30;
   EXPECT_EQ(extractionThreads(16, 800 * 600, 16 * kGiB), 16);
-  // 12 megapixels, reduced to 3200 pixels: 3.5 GiB for each.
-  EXPECT_EQ(extractionThreads(16, 4000 * 3000, 16 * kGiB), 3);
-  EXPECT_EQ(extractionThreads(16, 4000 * 3000, kGiB), 1);
+  // 12 megapixels, reduced to 3200×2400 pixels: 2.6 GiB for each.
+  const int64_t pixels = extractedPixels({"camera", 4000, 3000, 0});
+  EXPECT_EQ(pixels, 3200 * 2400);
+  EXPECT_EQ(extractedPixels({"camera", 600, 800, 0}), 600 * 800);
+  EXPECT_EQ(extractionThreads(16, pixels, 16 * kGiB), 4);
+  EXPECT_EQ(extractionThreads(16, pixels, kGiB), 1);
   EXPECT_GE(extractionThreads(0, 800 * 600, 16 * kGiB), 1);
 }
 
@@ -131,6 +134,22 @@ TEST(PhotoMatches, AreDoneIfTheTablesSaySoWhateverTheProgramReports) {
   };
   EXPECT_NE(match("echo broken; exit 1").find("broken"), std::string::npos);
   EXPECT_EQ(match("cp " + (folder / "later.db").string() + " $database_path; exit 1"), "");
+}
+
+TEST(PhotoMatches, SearchForLookAlikesOfThePhotosAskedForAlone) {
+  const TemporaryFolder folder;
+  makeDatabase(folder / "database.db");
+  const PhotoList list = numberedPhotos(3);
+  const std::string script =
+      "case $command in vocab_tree_builder) : > $vocab_tree_path;;\n"
+      "*) cp $query_image_list_path " +
+      (folder / "asked").string() +
+      "; echo 'Querying for image p1.jpg [1/1]'; echo '  image_id=3, image_name=p2.jpg, score=1';; esac";
+  PhotoMatches matches(folder.path(), list, {.program = writeColmap(folder, script).string()});
+  // The last one has no features, so that it could not be asked for.
+  EXPECT_EQ(matches.findLookAlikes({1, 2}, [](int64_t) {}), (LookAlikes{{}, {2}, {}}));
+  EXPECT_EQ(readTextFile(folder / "asked"), "p1.jpg\n");
+  EXPECT_EQ(matches.findLookAlikes({2}, [](int64_t) {}), LookAlikes(3));
 }
 
 TEST(PhotoMatches, SayWhyPhotosHaveNoPose) {

@@ -40,6 +40,17 @@ class PhotoModelsTest : public testing::Test {
   PhotoList list_ = numberedPhotos(50);
 };
 
+TEST(ModelFolders, AreKeptIfTheyCannotBeReplaced) {
+  const TemporaryFolder folder;
+  writeFileAtomically(folder / "joined/a", std::string_view("before"));
+  EXPECT_THROW(replaceFolder(folder / "missing", folder / "joined"), Error);
+  EXPECT_EQ(readTextFile(folder / "joined/a"), "before");
+  writeFileAtomically(folder / "new/a", std::string_view("after"));
+  replaceFolder(folder / "new", folder / "joined");
+  EXPECT_EQ(readTextFile(folder / "joined/a"), "after");
+  EXPECT_FALSE(fs::exists(folder / "joined.before"));
+}
+
 TEST_F(PhotoModelsTest, SayThatNoPhotosCouldBePlaced) {
   PhotoModels estimated = models("echo 'ERROR: failed to create sparse model'; exit 1");
   const std::string message = errorMessage([&] { estimated.map(false, ignore); });

@@ -121,10 +121,13 @@ void pairLookAlikes(const std::vector<bool>& tellPlace, const LookAlikes& lookAl
 
 }  // namespace
 
-bool needsLookAlikes(const PhotoList& list, const PairOptions& options) {
-  if (static_cast<int>(list.photos.size()) <= options.all) return false;
-  const std::vector<bool> tellPlace = tellPlaces(list);
-  return std::find(tellPlace.begin(), tellPlace.end(), false) != tellPlace.end();
+std::vector<int> photosForLookAlikes(const PhotoList& list, const PairOptions& options) {
+  std::vector<int> photos;
+  if (static_cast<int>(list.photos.size()) <= options.all) return photos;
+  const std::vector<bool> tellPlace = tellFootprints(list);
+  for (size_t i = 0; i < tellPlace.size(); ++i)
+    if (!tellPlace[i]) photos.push_back(static_cast<int>(i));
+  return photos;
 }
 
 std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& lookAlikes, const PairOptions& options) {
@@ -135,7 +138,7 @@ std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& look
       for (int b = a + 1; b < count; ++b) pairs.emplace(a, b);
     return {pairs.begin(), pairs.end()};
   }
-  const std::vector<bool> tellPlace = tellPlaces(list);
+  const std::vector<bool> tellPlace = tellFootprints(list);
   pairInSequence(list, tellPlace, options, pairs);
   pairByFootprint(list, tellPlace, options, pairs);
   pairLookAlikes(tellPlace, lookAlikes, options.lookAlikes, pairs);

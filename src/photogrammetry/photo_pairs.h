@@ -27,14 +27,16 @@ struct PairOptions {
 // For each photo of a list, others that look like it, the most similar one first: indices into the list.
 using LookAlikes = std::vector<std::vector<int>>;
 
-// Whether the choice of pairs needs look-alikes: some of too many photos for all pairs have no GPS.
-bool needsLookAlikes(const PhotoList& list, const PairOptions& options = {});
+// Returns the photos of which the choice of pairs needs look-alikes: of too many for all pairs, those of which GPS does
+// not tell what they show. In ascending order.
+std::vector<int> photosForLookAlikes(const PhotoList& list, const PairOptions& options = {});
 
 // Returns the pairs, sorted. With GPS, footprints on the ground decide, for photos without gimbal angles as if they
 // looked straight down; photos with GPS whose footprints overlap are connected. Heights above the ground that are not
 // known are those of the other photos, or follow from the distances of the photos; those that are known count for at
-// least what a survey with little overlap has. Photos without GPS, and those of which many have the same place and
-// nothing else tells them apart, are paired with those that look alike; `lookAlikes` may be empty.
+// least what a survey with little overlap has. Photos without GPS, those of which many have the same place and nothing
+// else tells them apart, and those that look above the horizon are paired with those that look alike; `lookAlikes` may
+// be empty.
 std::vector<PhotoPair> choosePairs(const PhotoList& list, const LookAlikes& lookAlikes,
                                    const PairOptions& options = {});
 

@@ -86,10 +86,10 @@ TEST(PhotoPairs, FollowTheSequenceWithoutGps) {
 
 TEST(PhotoPairs, OfPhotosWithoutGpsAreThoseThatLookAlike) {
   PhotoList list = survey(6, 10, 15);
-  EXPECT_FALSE(needsLookAlikes(list));
+  EXPECT_TRUE(photosForLookAlikes(list).empty());
   for (ListedPhoto& photo : list.photos) photo.tags.gps.reset();
-  EXPECT_TRUE(needsLookAlikes(list));
-  EXPECT_FALSE(needsLookAlikes(list, {.all = 60})) << "all pairs are compared anyway";
+  EXPECT_EQ(photosForLookAlikes(list).size(), 60u);
+  EXPECT_TRUE(photosForLookAlikes(list, {.all = 60}).empty()) << "all pairs are compared anyway";
   LookAlikes lookAlikes(60);
   lookAlikes[0] = {0, 30, 40, 50};
   const PairOptions options{.sequence = 1, .lookAlikes = 2};
@@ -135,10 +135,23 @@ TEST(PhotoPairs, OfPhotosWithOnePlaceAreThoseOfPhotosWithoutGps) {
   }
   PhotoList bare = album;
   for (ListedPhoto& photo : bare.photos) photo.tags.gps.reset();
-  EXPECT_TRUE(needsLookAlikes(album));
+  EXPECT_EQ(photosForLookAlikes(album).size(), 60u);
   LookAlikes lookAlikes(60);
   lookAlikes[0] = {30, 40};
   EXPECT_EQ(choosePairs(album, lookAlikes), choosePairs(bare, lookAlikes));
+}
+
+// As of the underside of a bridge, of which the ground tells nothing.
+TEST(PhotoPairs, OfPhotosAboveTheHorizonAreThoseOfPhotosWithoutGps) {
+  PhotoList list = survey(6, 10, 15);
+  for (size_t i = 20; i < 60; ++i) list.photos[i].tags.gimbal->pitch = 60;
+  const std::vector<int> photos = photosForLookAlikes(list);
+  ASSERT_EQ(photos.size(), 40u);
+  EXPECT_EQ(photos.front(), 20);
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
+  const auto has = [&](int a, int b) { return std::binary_search(pairs.begin(), pairs.end(), PhotoPair(a, b)); };
+  EXPECT_TRUE(has(40, 50));
+  EXPECT_FALSE(has(40, 51));
 }
 
 // Drone photos with GPS among more photos without.

@@ -139,6 +139,7 @@ std::vector<std::string> VideoFrames::command(const std::string& program) const 
 }
 
 VideoStream VideoFrames::inspect(const Watch& watch) {
+  if (stream_) return *stream_;
   std::vector<std::string> arguments = command(options_.probe);
   // V: no cover pictures.
   arguments.insert(
@@ -157,12 +158,12 @@ VideoStream VideoFrames::inspect(const Watch& watch) {
     throw Error(video_.string(), "", fmt::format("is no video that {} can read: {}", options_.probe, lastLine(process)),
                 remedy);
   }
-  const auto stream = parseVideoStream(text);
-  if (!stream) throw Error(video_.string(), "", "has no video stream", remedy);
-  if (stream->isHdr)
+  stream_ = parseVideoStream(text);
+  if (!stream_) throw Error(video_.string(), "", "has no video stream", remedy);
+  if (stream_->isHdr)
     warn("{}: its colours are HDR, which are not converted: the scene will look dull; export it as SDR",
          video_.string());
-  return *stream;
+  return *stream_;
 }
 
 void VideoFrames::choose(const Watch& watch) {

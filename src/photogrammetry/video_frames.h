@@ -9,6 +9,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -31,7 +32,8 @@ class VideoFrames {
   // Called a few times a second. What it throws ends the program that runs.
   using Watch = std::function<void(int64_t done)>;
 
-  // Returns what the file states of its pictures. Throws Error if it is no video, or the program is missing.
+  // Returns what the file states of its pictures, which it reads once. Throws Error if it is no video, or the program
+  // is missing.
   VideoStream inspect(const Watch& watch);
   // Chooses frames, unless that has been done. Throws Error if the video has fewer than three or cannot be decoded.
   void choose(const Watch& watch);
@@ -52,6 +54,7 @@ class VideoFrames {
 
   fs::path video_, folder_;
   VideoFrameOptions options_;
+  std::optional<VideoStream> stream_;
 };
 
 }  // namespace tessera

@@ -43,6 +43,13 @@ Stage VideoPhotos::stage() const {
           .settings = frames_->origin(),
           .isComplete = [frames = frames_] { return frames->isComplete(); },
           .discard = [frames = frames_] { frames->discard(); },
+          .needs =
+              [frames = frames_, &options = options_](bool) {
+                const auto stop = [&options](int64_t) {
+                  if (options.interrupted()) throw RunInterrupted();
+                };
+                return planFrames(frames->inspect(stop), options.frames);
+              },
           .run = [frames = frames_, folder = folder(),
                   &options = options_](bool) { return takeFrames(*frames, folder, options.interrupted); }};
 }

@@ -1,16 +1,24 @@
 #include "pipeline/georeference_json.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "base/error.h"
+#include "import/clean.h"
 
 namespace tessera {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json metresToJson(const Vec3d& x) {
+constexpr double kFarthest = 1e9;  // metres; figures are drawn to this scale
+
+// What is farther away, of a pose that is wrong, counts as this far.
+Json metresToJson(const Vec3d& metres) {
+  const Vec3d x = metres.cwiseMax(-0.99 * kFarthest).cwiseMin(0.99 * kFarthest);
   return {x.x(), x.y(), x.z()};
 }
 
@@ -64,8 +72,7 @@ const Json& arrayMember(const Json& object, const char* key) {
 }
 
 double toNumber(const Json& value) {
-  constexpr double kLargest = 1e9;  // metres; figures are drawn to this scale
-  if (!value.is_number() || !(std::abs(value.get<double>()) < kLargest)) throw Damaged();
+  if (!value.is_number() || !(std::abs(value.get<double>()) < kFarthest)) throw Damaged();
   return value.get<double>();
 }
 
@@ -155,6 +162,21 @@ GeoreferenceFile readGeoreference(const fs::path& file) {
   } catch (const Damaged&) {
     throw Error(file.string(), "", "does not describe a georeference", "remove it, and run again");
   }
+}
+
+std::string describeDisagreeing(const GeoreferenceFile& georeference) {
+  std::vector<std::string> photos;
+  double farthest = 0;
+  for (const GeoreferenceFile::Residual& residual : georeference.residuals) {
+    if (residual.isInlier) continue;
+    photos.push_back(residual.photo);
+    farthest = std::max(farthest, residual.metres.norm());
+  }
+  if (photos.empty()) return "";
+  return fmt::format(
+      "{} of {} GPS fixes disagree with the poses, by up to {:.0f} m ({}): either these fixes are wrong, or the poses "
+      "of these photos are, as where a place repeats itself",
+      photos.size(), georeference.fixes, farthest, abbreviateList(photos));
 }
 
 }  // namespace tessera

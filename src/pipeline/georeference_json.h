@@ -40,4 +40,7 @@ void writeGeoreference(const fs::path& file, const std::optional<Georeference>& 
 // Throws Error naming the file if it is missing or damaged.
 GeoreferenceFile readGeoreference(const fs::path& file);
 
+// Returns a warning that names the photos whose GPS fixes disagree with their poses; empty if all agree.
+std::string describeDisagreeing(const GeoreferenceFile& georeference);
+
 }  // namespace tessera

@@ -75,6 +75,26 @@ TEST_F(GeoreferenceJson, ReadsWhatItWrites) {
   EXPECT_FALSE(read.residuals[1].isInlier);
 }
 
+TEST_F(GeoreferenceJson, NamesPhotosWhoseFixesDisagree) {
+  writeGeoreference(file_, fit(), "", source());
+  const std::string text = describeDisagreeing(readGeoreference(file_));
+  EXPECT_EQ(text.find("1 of 2 GPS fixes disagree with the poses, by up to 100 m (\xef\xbf\xbd.jpg)"), 0u) << text;
+  Georeference agreeing = fit();
+  agreeing.residuals[1].isInlier = true;
+  writeGeoreference(file_, agreeing, "", source());
+  EXPECT_EQ(describeDisagreeing(readGeoreference(file_)), "");
+  writeGeoreference(file_, std::nullopt, "2 photos with GPS; three are needed", source());
+  EXPECT_EQ(describeDisagreeing(readGeoreference(file_)), "");
+}
+
+TEST_F(GeoreferenceJson, ReadsPosesThatAreAbsurdlyFarAway) {
+  Georeference wild = fit();
+  wild.residuals[1].metres = {1e12, -1e12, 0};
+  wild.frame.enuFromWorld(1, 3) = 1e11;
+  writeGeoreference(file_, wild, "", source());
+  EXPECT_NEAR(readGeoreference(file_).residuals[1].metres.x(), 1e9, 2e7);
+}
+
 TEST_F(GeoreferenceJson, KeepsTheReasonWhyThereIsNone) {
   writeGeoreference(file_, std::nullopt, "2 photos with GPS; three are needed", source());
   EXPECT_EQ(readGeoreference(file_).reason, "2 photos with GPS; three are needed");

@@ -7,7 +7,6 @@
 #include <set>
 
 #include "base/error.h"
-#include "base/file_digest.h"
 #include "base/log.h"
 #include "base/order_statistics.h"
 #include "base/progress.h"
@@ -26,6 +25,7 @@
 #include "pipeline/left_out_json.h"
 #include "pipeline/pairs_json.h"
 #include "pipeline/posed_source.h"
+#include "pipeline/result_digests.h"
 #include "pipeline/run_estimator.h"
 #include "pipeline/run_report.h"
 #include "pipeline/run_request.h"
@@ -85,8 +85,7 @@ class PhotoRun {
         {.name = "pairs",
          .settings = "",
          .isComplete = has("poses/pairs.json"),
-         .needs =
-             [this](bool) { return needsLookAlikes(list_) ? estimator_->matchingNeeds().lookAlikes : StageNeeds{}; },
+         .needs = [this](bool) { return estimator_->lookAlikeNeeds(); },
          .run = [this](bool) { return pairs(); }},
         {.name = "matches",
          .settings = "",
@@ -136,16 +135,18 @@ class PhotoRun {
          .run = [this](bool) { return train(); }},
         {.name = "bake",
          .settings = "",
+         .inputs = [this] { return modelDigest(out("model")); },
          .isComplete = has("scene/tileset.json"),
          .needs = [this](bool) { return planner_.needs().bake; },
          .run = [this](bool) { return bake(); }},
         {.name = "evaluate",
          .settings = std::string("--exposure ") + kEvaluatedExposures,
+         .inputs = [this] { return sceneDigest(out("scene")); },
          .isComplete = [this] { return !hasHoldOut() || (has("eval.json")() && has("evaluation.html")()); },
          .needs = [this](bool) { return planner_.needs().evaluate; },
          .run = [this](bool) { return evaluate(); }},
         {.name = "report",
-         .settings = frames_ ? "" : describeLeftOut(),
+         .settings = frames_ ? "" : leftOutDigest(list_.leftOut),
          .isComplete = has("report.html"),
          .run = [this](bool) { return report(); }},
     };
@@ -181,7 +182,7 @@ class PhotoRun {
                   fmt::format("holds {} photos that can be used; poses need three", list_.photos.size()),
                   "name a folder of JPEG or PNG photos, or a video");
     }
-    photosDigest_ = describePhotos();
+    photosDigest_ = photosDigest(list_.photos);
     planner_.photosAreListed();
     if (masks_) masks_->addTo(list_);
     estimator_ = std::make_unique<RunEstimator>(options_, list_, *matches_, photosDigest_);
@@ -209,19 +210,6 @@ class PhotoRun {
     };
   }
 
-  // By their contents: a copy has other times.
-  std::string describePhotos() const {
-    std::string text;
-    for (const ListedPhoto& photo : list_.photos) text += fmt::format("{} {}\n", photo.name, fileDigest(photo.file));
-    return textDigest(text);
-  }
-
-  std::string describeLeftOut() const {
-    std::string text;
-    for (const LeftOutPhoto& photo : list_.leftOut) text += fmt::format("{}\n{}\n", photo.name, photo.reason);
-    return textDigest(text);
-  }
-
   // The import may drop the photos that are to be held out: the capture decides, if it is there.
   bool hasHoldOut() const {
     try {
@@ -246,10 +234,10 @@ class PhotoRun {
 
   std::string pairs() {
     LookAlikes lookAlikes;
-    if (needsLookAlikes(list_)) {
+    if (const std::vector<int> photos = photosForLookAlikes(list_); !photos.empty()) {
       try {
-        inform("some photos have no GPS: photos that look alike are searched for");
-        lookAlikes = matches_->findLookAlikes([this](int64_t) { stopIfInterrupted(); });
+        inform("GPS does not tell what {} photos show: those that look like them are searched for", photos.size());
+        lookAlikes = matches_->findLookAlikes(photos, [this](int64_t) { stopIfInterrupted(); });
       } catch (const ColmapKilled&) {
         stopIfInterrupted();
         throw;
@@ -352,6 +340,8 @@ class PhotoRun {
     const auto fit = georeference(source.capture.photos, source.flight, reason);
     writeGeoreference(georeferenceFile(), fit, reason, source);
     if (!fit) return "none: " + reason;
+    if (const std::string text = describeDisagreeing(readGeoreference(georeferenceFile())); !text.empty())
+      warn("{}", text);
     if (fit->isBent()) {
       warn(
           "the heights of GPS bend by {:.1f} m ± {:.1f} m from the middle of the photos to the farthest: the poses "
@@ -480,11 +470,13 @@ void runFromPhotos(const PhotoRunOptions& options) {
   claimFolder(options.out);
   PhotoRun run(options);
   const std::vector<Stage> stages = run.stages();
-  if (options.dryRun && !run.isListed())
-    throw Error("--dry-run", "", "the photos of this video are not there yet", "run with --until frames first");
-  const RunPlan plan = planStages(options.out, stages, options.range);
+  RunPlan plan = planStages(options.out, stages, options.range);
+  if (!run.isListed()) {
+    inform("what the stages after `frames` take is known when the frames are there");
+    std::erase_if(plan.entries, [](const RunPlan::Entry& entry) { return entry.stage != "frames"; });
+  }
   if (options.dryRun) fmt::print("{}", describePlan(plan));
-  announcePlan(plan, options.out);
+  announcePlan(plan, options.out, run.isListed() ? "this" : "frames");
   if (options.dryRun) return;
   runStages(options.out, describeRequest(options), stages, options.range, [&] {
     if (options.interrupted()) throw RunInterrupted();

@@ -1,5 +1,7 @@
 #include "pipeline/run_estimator.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <thread>
 
@@ -16,9 +18,8 @@ RunEstimator::RunEstimator(const PhotoRunOptions& options, const PhotoList& list
 const MatchingRates& RunEstimator::rates() {
   if (rates_) return *rates_;
   const fs::path file = options_.out / "probe.json";
-  const std::string key = photosDigest_ + " " + std::to_string(options_.threads);
-  std::error_code status;
-  if (fs::exists(file, status)) rates_ = decodeMatchingRates(readTextFile(file), key);
+  const std::string key = fmt::format("{} {} threads", photosDigest_, options_.threads);
+  rates_ = readRates(key);
   if (!rates_) {
     const auto stop = [this] {
       if (options_.interrupted()) throw RunInterrupted();
@@ -27,6 +28,21 @@ const MatchingRates& RunEstimator::rates() {
     writeFileAtomically(file, encodeMatchingRates(*rates_, key));
   }
   return *rates_;
+}
+
+// Those of a probe of these photos whose key begins in this way.
+std::optional<MatchingRates> RunEstimator::readRates(const std::string& key) const {
+  const fs::path file = options_.out / "probe.json";
+  std::error_code status;
+  return fs::exists(file, status) ? decodeMatchingRates(readTextFile(file), key) : std::nullopt;
+}
+
+// How fast the machine is, another number of threads tells as well: no program is needed to measure it again.
+MatchingRates RunEstimator::anyRates() {
+  if (!rates_) {
+    if (const auto others = readRates(photosDigest_ + " ")) return *others;
+  }
+  return rates();
 }
 
 // The number of pairs that are compared, as far as it is known before the look-alikes are.
@@ -43,17 +59,22 @@ int64_t RunEstimator::expectedPairs() {
   }
   if (expectedPairs_ == 0) {
     expectedPairs_ = static_cast<int64_t>(choosePairs(list_, {}).size());
-    if (needsLookAlikes(list_))
-      expectedPairs_ += static_cast<int64_t>(kPairsPerPhoto * static_cast<double>(list_.photos.size()));
+    expectedPairs_ += static_cast<int64_t>(kPairsPerPhoto * static_cast<double>(countForLookAlikes()));
   }
   return expectedPairs_;
+}
+
+int64_t RunEstimator::countForLookAlikes() {
+  if (!forLookAlikes_) forLookAlikes_ = static_cast<int64_t>(photosForLookAlikes(list_).size());
+  return *forLookAlikes_;
 }
 
 MatchingNeeds RunEstimator::matchingNeeds() {
   const PhotoMatches::Counts counts = matches_.count();
   MatchingSize size{
       .photos = static_cast<int64_t>(list_.photos.size()), .pairs = expectedPairs(), .threads = threads()};
-  for (const CameraBody& body : list_.bodies) size.pixels = std::max(size.pixels, int64_t{body.width} * body.height);
+  for (const CameraBody& body : list_.bodies) size.pixels = std::max(size.pixels, extractedPixels(body));
+  size.forLookAlikes = countForLookAlikes();
   if (counts.photos == size.photos) {
     size.features = counts.features;
     if (counts.pairs >= size.pairs) size.inliers = counts.inliers;
@@ -69,6 +90,10 @@ StageNeeds RunEstimator::featureNeeds(bool resumes) {
 StageNeeds RunEstimator::matchNeeds(bool resumes) {
   const double share = static_cast<double>(matches_.count().pairs) / static_cast<double>(expectedPairs());
   return withoutDone(matchingNeeds().matches, resumes ? share : 0);
+}
+
+StageNeeds RunEstimator::lookAlikeNeeds() {
+  return countForLookAlikes() > 0 ? matchingNeeds().lookAlikes : StageNeeds{};
 }
 
 StageNeeds RunEstimator::remappingNeeds(size_t missing, size_t pairs) {
@@ -109,7 +134,7 @@ const TrainingSize& RunEstimator::trainingSize() {
 TrainingSize RunEstimator::trainingSize(int downscale) {
   TrainingSize size = trainingSize();
   size.photoPixels /= int64_t{downscale} * downscale;
-  size.relativeSeconds = relativeSeconds(rates());
+  size.relativeSeconds = relativeSeconds(anyRates());
   size.threads = options_.threads;
   size.isLinked = downscale == 1 && areOnOneDisk(list_.photos.front().file, options_.out);
   return size;

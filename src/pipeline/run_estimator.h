@@ -22,6 +22,7 @@ class RunEstimator {
   MatchingNeeds matchingNeeds();
   StageNeeds featureNeeds(bool resumes);
   StageNeeds matchNeeds(bool resumes);
+  StageNeeds lookAlikeNeeds();
   // Those of comparing so many more pairs, and of placing the photos that are missing in the model.
   StageNeeds remappingNeeds(size_t missing, size_t pairs);
 
@@ -35,7 +36,10 @@ class RunEstimator {
 
  private:
   const MatchingRates& rates();
+  std::optional<MatchingRates> readRates(const std::string& key) const;
+  MatchingRates anyRates();
   int64_t expectedPairs();
+  int64_t countForLookAlikes();
   int threads() const;
 
   const PhotoRunOptions& options_;
@@ -44,7 +48,8 @@ class RunEstimator {
   std::string photosDigest_;
   std::optional<MatchingRates> rates_;
   std::optional<TrainingSize> trainingSize_;
-  int64_t expectedPairs_ = 0;  // 0: not known yet
+  int64_t expectedPairs_ = 0;             // 0: not known yet
+  std::optional<int64_t> forLookAlikes_;  // once it is counted
 };
 
 }  // namespace tessera

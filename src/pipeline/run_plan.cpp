@@ -14,6 +14,8 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "base/memory.h"
+#include "base/order_statistics.h"
+#include "photogrammetry/frame_choice.h"
 #include "photogrammetry/photo_matches.h"
 
 namespace tessera {
@@ -28,7 +30,7 @@ constexpr size_t kProbed = 5;               // photos: ten pairs
 constexpr size_t kFewestToProbe = 15;       // photos: of fewer, a probe is a large part of the task
 constexpr double kFeatureSeconds = 1.4e-6;  // of two cores, for the features in a pixel (1.25 and 1.67 were measured)
 
-// The photos of one camera from the middle of those of the most frequent camera.
+// The photos from the middle of those of the most frequent camera, or of all if it has taken too few.
 PhotoList photosToProbe(const PhotoList& list) {
   std::vector<size_t> counts(list.bodies.size());
   for (const ListedPhoto& photo : list.photos) ++counts[static_cast<size_t>(photo.body)];
@@ -36,6 +38,7 @@ PhotoList photosToProbe(const PhotoList& list) {
   std::vector<ListedPhoto> ofBody;
   std::copy_if(list.photos.begin(), list.photos.end(), std::back_inserter(ofBody),
                [body](const ListedPhoto& photo) { return photo.body == body; });
+  if (ofBody.size() < kProbed) ofBody = list.photos;
   const size_t count = std::min(kProbed, ofBody.size());
   const auto begin = ofBody.begin() + static_cast<std::ptrdiff_t>((ofBody.size() - count) / 2);
   PhotoList chosen;
@@ -44,13 +47,6 @@ PhotoList photosToProbe(const PhotoList& list) {
   chosen.flights = list.flights;
   for (ListedPhoto& photo : chosen.photos) photo.mask.clear();  // which say nothing about the others
   return chosen;
-}
-
-// Returns the pixels of a photo in which COLMAP looks for features: it reduces larger photos first.
-double extractedPixels(const CameraBody& body) {
-  constexpr double kLongest = 3200;
-  const double factor = std::min(1.0, kLongest / std::max(body.width, body.height));
-  return factor * body.width * factor * body.height;
 }
 
 MatchingRates probe(const PhotoList& chosen, int threads, const fs::path& folder, const std::function<void()>& look) {
@@ -65,25 +61,41 @@ MatchingRates probe(const PhotoList& chosen, int threads, const fs::path& folder
   matches.match(pairs, [&](int64_t) { look(); });
   const auto matched = SteadyClock::now();
   const PhotoMatches::Counts counts = matches.count();
-  const CameraBody& body = chosen.bodies[static_cast<size_t>(chosen.photos.front().body)];
+  double pixels = 0;
+  for (const ListedPhoto& photo : chosen.photos)
+    pixels += static_cast<double>(extractedPixels(chosen.bodies[static_cast<size_t>(photo.body)])) / count;
   return {.secondsPerPhoto = Seconds(extracted - start).count() / count,
           .secondsPerPair = Seconds(matched - extracted).count() / static_cast<double>(pairs.size()),
-          .pixelsPerPhoto = extractedPixels(body),
+          .pixelsPerPhoto = pixels,
           .featuresPerPhoto = static_cast<double>(counts.features) / count,
           .inliersPerPair = static_cast<double>(counts.inliers) / static_cast<double>(pairs.size())};
 }
 
 }  // namespace
 
+MatchingRates expectRates(const PhotoList& list) {
+  constexpr double kMaxFeatures = 8192;  // COLMAP's
+  MatchingRates rates;
+  std::vector<double> pixels;
+  for (const ListedPhoto& photo : list.photos)
+    pixels.push_back(static_cast<double>(extractedPixels(list.bodies[static_cast<size_t>(photo.body)])));
+  const double size = upperMedian(pixels) / rates.pixelsPerPhoto;
+  const double features = std::min(size, kMaxFeatures / rates.featuresPerPhoto);
+  rates.secondsPerPhoto *= size;
+  rates.pixelsPerPhoto *= size;
+  for (double* number : {&rates.featuresPerPhoto, &rates.secondsPerPair, &rates.inliersPerPair}) *number *= features;
+  return rates;
+}
+
 MatchingRates measureMatchingRates(const PhotoList& list, int threads, const fs::path& folder,
                                    const std::function<void()>& look) {
   ColmapProgram(folder / "probe.log");  // throws if there is none that can be used
-  if (list.photos.size() < kFewestToProbe) return {};
+  MatchingRates rates = expectRates(list);
+  if (list.photos.size() < kFewestToProbe) return rates;
   std::error_code status;
   fs::remove_all(folder, status);
   fs::create_directories(folder, status);
   if (status) throw Error(folder.string(), "", "cannot be made: " + status.message(), "name another folder");
-  MatchingRates rates;
   try {
     inform("a few photos are tried, to tell how long all will take");
     rates = probe(photosToProbe(list), threads, folder, look);
@@ -108,7 +120,8 @@ std::string encodeMatchingRates(const MatchingRates& rates, const std::string& k
 
 std::optional<MatchingRates> decodeMatchingRates(const std::string& text, const std::string& key) {
   const auto json = nlohmann::json::parse(text, nullptr, false);
-  if (!json.is_object() || !json.contains("of") || json["of"] != key) return std::nullopt;
+  if (!json.is_object() || !json.contains("of") || !json["of"].is_string()) return std::nullopt;
+  if (!json["of"].get<std::string>().starts_with(key)) return std::nullopt;
   MatchingRates rates;
   const std::pair<const char*, double*> fields[] = {{"seconds_per_photo", &rates.secondsPerPhoto},
                                                     {"seconds_per_pair", &rates.secondsPerPair},
@@ -128,10 +141,25 @@ double relativeSeconds(const MatchingRates& rates) {
   return std::clamp(rates.secondsPerPhoto / (rates.pixelsPerPhoto * kFeatureSeconds), 0.05, 20.0);
 }
 
-// The constants are fitted to four sets of 18 to 487 photos: docs/benchmarks.md, "Photographs without poses". Mapping
-// adjusts all photos again and again: its time follows from their number more closely than from that of the inliers.
+namespace {
+
+// The same for the solver, which waits for memory more than features do: the mean of theirs and of matches. On two
+// machines that extract features equally fast, matches and mapping took 1.4 times as long on one as on the other.
+double relativeSolverSeconds(const MatchingRates& rates) {
+  constexpr double kPairSeconds = 5.2e-5;  // of two cores, for each feature of a photo (4.8e-5 to 5.7e-5 were measured)
+  const double features = relativeSeconds(rates);
+  if (rates.featuresPerPhoto < 1) return features;
+  const double pairs = std::clamp(rates.secondsPerPair / (rates.featuresPerPhoto * kPairSeconds), 0.05, 20.0);
+  return std::sqrt(features * pairs);
+}
+
+}  // namespace
+
+// The constants are fitted to nine runs of 18 to 487 photos on two machines: docs/benchmarks.md, "Photographs without
+// poses". Mapping adjusts all photos again and again: its time follows from their number more closely than from that of
+// the inliers.
 MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates) {
-  constexpr double kMapping = 0.187, kMappingGrowth = 1.274, kAdjusting = 0.033, kAdjustingGrowth = 1.316;
+  constexpr double kMapping = 0.314, kMappingGrowth = 1.173, kAdjusting = 0.033, kAdjustingGrowth = 1.316;
   constexpr double kMargin = 1.4;        // of inliers and features, for memory, before they are known
   constexpr double kOfNeighbours = 0.6;  // inliers of all pairs, relative to those of neighbours
   constexpr double kSecondsPerWordFeature = 0.35e-3, kPhotosForWords = 60;
@@ -140,6 +168,7 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
   constexpr int64_t kMapperBytesPerInlier = 560, kMapperBytesPerFeature = 115;
   const double speed = relativeSeconds(rates);
   const auto photos = static_cast<double>(size.photos), pairs = static_cast<double>(size.pairs);
+  const auto lookAlikes = static_cast<double>(size.forLookAlikes);
   const double features = size.features > 0 ? static_cast<double>(size.features) : photos * rates.featuresPerPhoto;
   const double inliers =
       size.inliers > 0 ? static_cast<double>(size.inliers) : pairs * rates.inliersPerPair * kOfNeighbours;
@@ -153,7 +182,7 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
                     bytes(kBytesPerFeature, features)};
   const double featuresPerPhoto = photos > 0 ? features / photos : 0;
   needs.lookAlikes = {(kSecondsPerWordFeature * std::min(kPhotosForWords, photos) * featuresPerPhoto +
-                       kLookAlikeSeconds * photos + kSecondsPerTwoPhotos * photos * photos) *
+                       kLookAlikeSeconds * photos + kSecondsPerTwoPhotos * photos * lookAlikes) *
                           speed,
                       64 * kMiB + bytes(kBytesPerFeature, features), bytes(0.03 * kBytesPerFeature, features)};
   // The photos that were tried may have had fewer features than most. Time grows about as their number does.
@@ -163,11 +192,26 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
   const double margin = size.inliers > 0 ? 1 : kMargin;
   const int64_t mapper =
       32 * kMiB + bytes(kMapperBytesPerInlier, margin * inliers) + bytes(kMapperBytesPerFeature, margin * features);
-  needs.mapping = {kMapping * std::pow(photos, kMappingGrowth) * speed, mapper,
+  const double solving = relativeSolverSeconds(rates);
+  needs.mapping = {kMapping * std::pow(photos, kMappingGrowth) * solving, mapper,
                    bytes(kModelBytesPerInlier * kModels, inliers)};
-  needs.adjusting = {kAdjusting * std::pow(photos, kAdjustingGrowth) * speed, mapper,
+  needs.adjusting = {kAdjusting * std::pow(photos, kAdjustingGrowth) * solving, mapper,
                      bytes(kModelBytesPerInlier, inliers)};
   return needs;
+}
+
+StageNeeds planFrames(const VideoStream& stream, int count) {
+  constexpr double kDecodeSeconds = 7e-9, kLookSeconds = 1.5e-3, kStoreSeconds = 8e-9;  // of a pixel, frame, pixel
+  constexpr double kBytesPerPixel = 0.5, kDecoderBytesPerPixel = 40;
+  const double pixels = static_cast<double>(stream.width) * stream.height;
+  const double frames =
+      stream.frames > 0 ? static_cast<double>(stream.frames) : stream.seconds * stream.framesPerSecond;
+  if (pixels < 1 || frames < 1) return {};
+  const double chosen =
+      std::min(frames, count > 0 ? count : std::min(double{kMaxDefaultFrames}, stream.seconds / kShortestInterval));
+  return {frames * (2 * pixels * kDecodeSeconds + kLookSeconds) + chosen * pixels * kStoreSeconds,
+          64 * kMiB + static_cast<int64_t>(kDecoderBytesPerPixel * pixels),
+          static_cast<int64_t>(chosen * pixels * kBytesPerPixel)};
 }
 
 TrainingNeeds planTraining(const TrainingSize& size, const TrainingCosts& costs) {
@@ -293,12 +337,13 @@ void checkRoom(const RunPlan& plan, const fs::path& folder) {
   requireRoom(plan, folder, status ? kUnknown : static_cast<int64_t>(space.available), usableMemoryBytes());
 }
 
-void announcePlan(const RunPlan& plan, const fs::path& folder) {
+void announcePlan(const RunPlan& plan, const fs::path& folder, const char* what) {
   constexpr double kGiB = 1 << 30, kGigabyte = 1e9, kLongSeconds = 30;
   const StageNeeds total = plan.total();
   if (total.seconds > kLongSeconds) {
-    inform("this will take about {}, up to {:.1f} GiB of memory and {:.2f} GB of disk", describeDuration(total.seconds),
-           static_cast<double>(total.memoryBytes) / kGiB, static_cast<double>(total.diskBytes) / kGigabyte);
+    inform("{} will take about {}, up to {:.1f} GiB of memory and {:.2f} GB of disk", what,
+           describeDuration(total.seconds), static_cast<double>(total.memoryBytes) / kGiB,
+           static_cast<double>(total.diskBytes) / kGigabyte);
   }
   checkRoom(plan, folder);
 }

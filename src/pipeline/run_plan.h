@@ -9,6 +9,7 @@
 
 #include "base/file.h"
 #include "photogrammetry/photo_list.h"
+#include "photogrammetry/video_list.h"
 #include "pipeline/stage.h"
 
 namespace tessera {
@@ -23,25 +24,30 @@ struct MatchingRates {
   double inliersPerPair = 400;     // mean of neighbours
 };
 
+// Returns the rates that photos of this size have on two cores.
+MatchingRates expectRates(const PhotoList& list);
+
 // Measures them with COLMAP on five successive photos from the middle of the list, in `folder`, which is removed
 // afterwards. `look` is called now and then; what it throws ends the program that runs. Throws Error if COLMAP cannot
-// be run, and returns the defaults, with a warning, if it fails on these photos or if there are too few photos to be
-// worth it.
+// be run. Returns expectRates() if there are fewer than 15 photos, of which a probe would be a large part of the task,
+// or, with a warning, if COLMAP fails on these photos.
 MatchingRates measureMatchingRates(const PhotoList& list, int threads, const fs::path& folder,
                                    const std::function<void()>& look);
 
-// Rates as JSON, with `key`, which tells what they were measured on. Returns nothing for another key, or damaged text.
+// Rates as JSON, with `key`, which tells what they were measured on. Reading returns nothing if the key does not begin
+// with this one, or of a damaged text.
 std::string encodeMatchingRates(const MatchingRates& rates, const std::string& key);
 std::optional<MatchingRates> decodeMatchingRates(const std::string& text, const std::string& key);
 
 // How large the task is, as far as it is known.
 struct MatchingSize {
   int64_t photos = 0;
-  int64_t pixels = 0;    // of the largest photo
-  int64_t pairs = 0;     // that are compared
-  int64_t features = 0;  // of all photos; 0: not known yet
-  int64_t inliers = 0;   // of all pairs; 0: not known yet
-  int threads = 0;       // of the machine that are used
+  int64_t pixels = 0;         // of the largest photo, in which features are looked for
+  int64_t pairs = 0;          // that are compared
+  int64_t features = 0;       // of all photos; 0: not known yet
+  int64_t inliers = 0;        // of all pairs; 0: not known yet
+  int threads = 0;            // of the machine that are used
+  int64_t forLookAlikes = 0;  // photos of which others are searched for that look like them
 };
 
 // What the stages of structure from motion take, from their beginning to their end.
@@ -49,6 +55,10 @@ struct MatchingNeeds {
   StageNeeds features, lookAlikes, matches, mapping, adjusting;
 };
 MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates);
+
+// What photos from a video take: the stage that decodes it twice, and stores `count` frames (0: as many as chooseFrames
+// takes then). Zeros if the file does not state enough.
+StageNeeds planFrames(const VideoStream& stream, int count);
 
 // What a representation costs to train, bake and evaluate on two cores, by order of magnitude: measured on small
 // scenes, and for the blocks into which training divides a capture.
@@ -102,8 +112,8 @@ void requireRoom(const RunPlan& plan, const fs::path& folder, int64_t freeBytes,
 // requireRoom with the disk and the memory of this machine.
 void checkRoom(const RunPlan& plan, const fs::path& folder);
 
-// States what a plan takes, if that is long, and checks it.
-void announcePlan(const RunPlan& plan, const fs::path& folder);
+// States what a plan takes, if that is long, and checks it. `what`: for people, what is planned.
+void announcePlan(const RunPlan& plan, const fs::path& folder, const char* what = "this");
 
 // Returns what is left of a stage of which this share, from 0 to 1, is done.
 StageNeeds withoutDone(StageNeeds needs, double share);

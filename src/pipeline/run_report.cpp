@@ -200,6 +200,8 @@ class RunPage {
           "form a {}. Photos that look aslant, or lines that cross at another height, prevent it.</li>\n",
           georeference_.bend->metres, georeference_.bend->error, georeference_.bend->metres > 0 ? "dome" : "bowl");
     }
+    if (const std::string text = describeDisagreeing(georeference_); !text.empty())
+      html += fmt::format("<li>{}.</li>\n", escapedHtml(text));
     if (!georeference_.hasAltitudes)
       html += "<li>GPS states no altitudes: the cameras are taken to be at height 0 of the Earth, on average.</li>\n";
     if (georeference_.ignoresTakeOff)
@@ -226,6 +228,10 @@ class RunPage {
     };
     addGroups(withoutPose, "not in the scene");
     addGroups(unusable, "not used");
+    size_t ofStages = 0;
+    for (const StageRecord& stage : stages_) ofStages += stage.warnings.size();
+    if (ofStages > 0)
+      html += fmt::format("<li>{} of stages: see <a href=\"#stages\">there</a>.</li>\n", plural(ofStages, "warning"));
     return html.empty() ? "<h2>Warnings</h2>\n<p>None: all photos are in the scene.</p>\n"
                         : "<h2>Warnings</h2>\n<ul class=\"warnings\">\n" + html + "</ul>\n";
   }
@@ -276,12 +282,15 @@ class RunPage {
   std::string stages() const {
     if (stages_.empty()) return "";
     std::string html =
-        "<h2>Stages</h2>\n<div class=\"scroll wide\"><table>\n<tr><th>stage</th><th>time</th><th>peak memory</th>"
+        "<h2 id=\"stages\">Stages</h2>\n<div class=\"scroll wide\"><table>\n<tr><th>stage</th><th>time</th><th>peak "
+        "memory</th>"
         "<th>result</th></tr>\n";
     const auto addRow = [&](const StageRecord& stage) {
+      std::string result = escapedHtml(stage.summary);
+      for (const std::string& warning : stage.warnings)
+        result += fmt::format("<br><span class=\"quiet\">warning: {}</span>", escapedHtml(warning));
       html += fmt::format("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", escapedHtml(stage.name),
-                          formatSeconds(stage.seconds), formatBytes(static_cast<double>(stage.peakBytes)),
-                          escapedHtml(stage.summary));
+                          formatSeconds(stage.seconds), formatBytes(static_cast<double>(stage.peakBytes)), result);
     };
     StageRecord all{.name = "all"};
     for (const StageRecord& stage : stages_) {

@@ -90,6 +90,24 @@ TEST_F(RunReport, SummarisesTheRun) {
   EXPECT_EQ(countParts(html, "src=\"data:image/jpeg;base64,/9j/"), 4u);
 }
 
+TEST_F(RunReport, NamesPhotosWhoseGpsDisagrees) {
+  fit_.residuals[2].isInlier = false;
+  fit_.residuals[2].metres = {40, 0, 0};
+  fit_.inliers = 3;
+  writeGeoreference(out_ / "poses/georeference.json", fit_, "", source_);
+  EXPECT_TRUE(says("<li>1 of 4 GPS fixes disagree with the poses, by up to 40 m (2.jpg)"));
+  EXPECT_FALSE(says("None: all photos"));
+}
+
+TEST_F(RunReport, StatesTheWarningsOfStages) {
+  Json run = Json::parse(readTextFile(out_ / "run.json"));
+  run["stages"][0]["warnings"] = {"no <plausible> lens", "more"};
+  writeFileAtomically(out_ / "run.json", run.dump());
+  EXPECT_TRUE(says("<li>2 warnings of stages"));
+  EXPECT_FALSE(says("None: all photos"));
+  EXPECT_TRUE(says("4 of 4 &amp; more<br><span class=\"quiet\">warning: no &lt;plausible&gt; lens</span><br>"));
+}
+
 TEST_F(RunReport, IsOneFileWithoutScripts) {
   const std::string html = page();
   for (const char* part : {"<script", "http:", "https:", "<link", "@import", " onclick"})

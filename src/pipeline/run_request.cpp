@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/log.h"
 #include "import/holdout.h"
+#include "photogrammetry/photo_list.h"
 
 namespace tessera {
 namespace {
@@ -81,6 +82,9 @@ void requireUsableRequest(const PhotoRunOptions& options) {
     throw Error(options.out.string(), "", "is the folder of photos, or in it: its pictures would be taken for photos",
                 "name another folder to write to");
   }
+  // Captures and models name paths as JSON does.
+  if (!isUtf8(fs::absolute(options.out).string()))
+    throw Error(options.out.string(), "", "is a path that is not UTF-8", "name another folder to write to");
   checkHoldOut(options.holdout);
   for (const char* name : {"frames", "poses", "capture", "model", "scene", "probe", "logs", "report.html",
                            "evaluation.html", "eval.json"}) {

@@ -92,6 +92,21 @@ TEST_F(RunRequests, PreferTheFlagsThatAreGiven) {
   EXPECT_EQ(adopt({"--method"}).steps, 0);
 }
 
+TEST_F(RunRequests, RefuseAPlaceThatJsonCannotName) {
+  options_.photos = folder_.path();
+  options_.out = fs::temp_directory_path() /
+                 "S\xfc"
+                 "d";
+  try {
+    requireUsableRequest(options_);
+    ADD_FAILURE() << "training would fail, after hours";
+  } catch (const Error& error) {
+    EXPECT_NE(std::string(error.what()).find("not UTF-8"), std::string::npos) << error.what();
+  }
+  options_.out = fs::temp_directory_path() / "S\xc3\xbc_d";
+  EXPECT_NO_THROW(requireUsableRequest(options_));
+}
+
 TEST_F(RunRequests, RefuseWhatIsNoValue) {
   for (const char* flags :
        {R"("--minutes": "ten")", R"("--minutes": "-3")", R"("--steps": "0.5")", R"("--downscale": "99")",

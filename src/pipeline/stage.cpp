@@ -27,17 +27,19 @@ struct Record {
   double seconds = 0;
   int64_t peakBytes = 0;
   StageNeeds expected;
+  std::string inputs;
+  std::vector<std::string> warnings;
 };
 
-// Returns what run.json of an earlier run says; nothing if the file is missing or damaged.
 // Whether anybody still reads it does not matter: the terminal may have been closed.
 void say(const std::string& line) {
   std::fwrite(line.data(), 1, line.size(), stdout);
   std::fflush(stdout);
 }
 
+// Returns what run.json of an earlier run says; nothing if the file is missing or damaged.
 Json readRun(const fs::path& file) {
-  constexpr uint64_t kMaxBytes = 1 << 20;
+  constexpr uint64_t kMaxBytes = 16 << 20;
   std::error_code status;
   return fs::exists(file, status) ? Json::parse(readTextFile(file, kMaxBytes), nullptr, false) : Json();
 }
@@ -61,6 +63,11 @@ std::vector<std::pair<std::string, Record>> readRecords(const fs::path& file, st
     };
     entry.digest = text("digest");
     entry.summary = text("summary");
+    entry.inputs = text("inputs");
+    if (stage.contains("warnings") && stage["warnings"].is_array()) {
+      for (const Json& warning : stage["warnings"])
+        if (warning.is_string()) entry.warnings.push_back(warning.get<std::string>());
+    }
     entry.isFinished = stage.contains("finished") && stage["finished"] == true;
     entry.seconds = number("seconds");
     entry.peakBytes = static_cast<int64_t>(number("peak_bytes"));
@@ -71,14 +78,27 @@ std::vector<std::pair<std::string, Record>> readRecords(const fs::path& file, st
 }
 
 Json toJson(const std::string& name, const Record& result) {
-  return {{"name", name},
-          {"digest", result.digest},
-          {"finished", result.isFinished},
-          {"seconds", result.seconds},
-          {"peak_bytes", result.peakBytes},
-          {"expected_seconds", result.expected.seconds},
-          {"expected_peak_bytes", result.expected.memoryBytes},
-          {"summary", result.summary}};
+  Json stage = {{"name", name},
+                {"digest", result.digest},
+                {"finished", result.isFinished},
+                {"seconds", result.seconds},
+                {"peak_bytes", result.peakBytes},
+                {"expected_seconds", result.expected.seconds},
+                {"expected_peak_bytes", result.expected.memoryBytes},
+                {"summary", result.summary}};
+  if (!result.inputs.empty()) stage["inputs"] = result.inputs;
+  if (!result.warnings.empty()) stage["warnings"] = result.warnings;
+  return stage;
+}
+
+// Adds warnings, once each, as long as the record stays small.
+void addWarnings(std::vector<std::string>& all, const std::vector<std::string>& more) {
+  constexpr size_t kLongest = 1000;
+  for (std::string text : more) {
+    if (text.size() > kLongest) text = text.substr(0, kLongest) + " …";
+    const bool isKnown = std::find(all.begin(), all.end(), text) != all.end();
+    if (!isKnown && all.size() < WarningRecorder::kMaxRecorded) all.push_back(text);
+  }
 }
 
 // Names of files need not be UTF-8.
@@ -135,7 +155,9 @@ Remaining findRemaining(const fs::path& folder, const std::vector<Stage>& stages
     if (!again) {
       const auto record =
           std::find_if(before.begin(), before.end(), [&](const auto& entry) { return entry.first == stage.name; });
-      const bool isKnown = stage.name != from && record != before.end() && record->second.digest == digest;
+      // Records of former versions name no inputs.
+      const bool isKnown = stage.name != from && record != before.end() && record->second.digest == digest &&
+                           (record->second.inputs.empty() || record->second.inputs == stage.inputs());
       if (isKnown && record->second.isFinished && stage.isComplete()) {
         remaining.known.push_back(record->second);
         ++remaining.first;
@@ -180,7 +202,7 @@ std::vector<StageRecord> readStageRecords(const fs::path& folder) {
   std::string begunFrom;
   std::vector<StageRecord> stages;
   for (const auto& [name, result] : readRecords(folder / "run.json", begunFrom))
-    if (result.isFinished) stages.push_back({name, result.summary, result.seconds, result.peakBytes});
+    if (result.isFinished) stages.push_back({name, result.summary, result.seconds, result.peakBytes, result.warnings});
   return stages;
 }
 
@@ -250,7 +272,9 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
     Record result{.digest = remaining.digests[i],
                   .seconds = before.seconds,
                   .peakBytes = before.peakBytes,
-                  .expected = before.expected};
+                  .expected = before.expected,
+                  .inputs = stage.inputs(),
+                  .warnings = before.warnings};
     const auto recordBegun = [&] {
       Json begun = run;
       begun["stages"].push_back(toJson(stage.name, result));
@@ -262,7 +286,9 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
     const bool measuresPeak = restartPeakResidentBytes();
     takePeakOfChildren();
     const auto start = std::chrono::steady_clock::now();
+    const WarningRecorder warnings;
     const auto count = [&] {
+      addWarnings(result.warnings, warnings.texts());
       result.seconds = before.seconds + std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       result.peakBytes =
           std::max({before.peakBytes, takePeakOfChildren(), measuresPeak ? peakResidentBytes() : residentBytes()});

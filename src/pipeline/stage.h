@@ -24,6 +24,9 @@ struct StageNeeds {
 struct Stage {
   std::string name;
   std::string settings;  // what its result depends on, besides the results of earlier stages
+  // What else its result depends on, and what earlier stages are not alone to write; empty: nothing. It is called, and
+  // recorded, when the stage begins: a stage that has read something else is run again.
+  std::function<std::string()> inputs = [] { return std::string(); };
   std::function<bool()> isComplete = [] { return true; };  // whether what it wrote is still there
   // Removes what a result for other settings has left, which `run` must not use; called before it begins anew.
   std::function<void()> discard = [] {};
@@ -41,6 +44,7 @@ struct StageRecord {
   std::string name, summary;
   double seconds = 0;
   int64_t peakBytes = 0;  // of memory, of this process or of a program that the stage ran, the larger one
+  std::vector<std::string> warnings;
 };
 
 struct StageRange {
@@ -72,7 +76,8 @@ struct RunRequest {
 
 // Runs the stages in order, and prints a line for each on stdout, with the time that those after it will take. run.json
 // records what they were expected to take, all before the first one runs (of finished stages, what they took), and each
-// when it begins. What interrupted attempts at a stage took is added to its record, unless they were killed. Throws
+// when it begins, with the warnings that it gives. What interrupted attempts at a stage took, and their warnings, are
+// added to its record, unless they were killed. Throws
 // Error if a stage of `range` does not exist or the last one precedes the first, and what a stage or `check` throws,
 // which is called before each stage that runs.
 void runStages(

@@ -7,6 +7,7 @@
 
 #include "base/child_process.h"
 #include "base/error.h"
+#include "base/log.h"
 #include "base/testing/temporary_folder.h"
 
 namespace tessera {
@@ -98,6 +99,77 @@ TEST_F(Stages, AreRefusedIfTheLastPrecedesTheFirst) {
   run({"", "", ""});
   EXPECT_EQ(run({"", "", ""}, {.from = "three", .until = "two"}), "failed");
   EXPECT_EQ(run({"", "", ""}, {.from = "two", .until = "two"}), "two ");
+}
+
+TEST_F(Stages, AreRepeatedIfAnotherProgramHasChangedTheirInputs) {
+  std::string input = "a", ran;
+  std::vector<Stage> stages;
+  for (const char* name : {"one", "two", "three"}) {
+    stages.push_back({.name = name, .run = [&ran, name](bool resumes) {
+                        ran += std::string(resumes ? "resumed " : "") + name + " ";
+                        return "done";
+                      }});
+  }
+  stages[0].run = [&](bool) {
+    input += "b";  // what this stage writes, the second one reads
+    return "done";
+  };
+  stages[1].inputs = [&] { return input; };
+  const auto run = [&] {
+    ran.clear();
+    runStages(folder_.path(), {}, stages, {});
+    return ran;
+  };
+  EXPECT_EQ(run(), "two three ");
+  EXPECT_EQ(run(), "");
+  input = "another";
+  EXPECT_EQ(run(), "two three ");
+  EXPECT_EQ(run(), "");
+  stages[1].inputs = [] { return std::string(); };
+  EXPECT_EQ(run(), "two three ") << "they are gone";
+  EXPECT_EQ(run(), "");
+  stages[1].inputs = [&] { return input; };
+  EXPECT_EQ(run(), "") << "runs of former versions record none";
+}
+
+TEST_F(Stages, AreNotResumedWithOtherInputs) {
+  std::string input = "a", ran;
+  const std::vector<Stage> stages = {{.name = "one",
+                                      .inputs = [&] { return input; },
+                                      .run = [&](bool resumes) -> std::string {
+                                        ran += resumes ? "resumed " : "begun ";
+                                        throw Error("one", "", "fails", "repair it");
+                                      }}};
+  for (const char* next : {"a", "a", "b"}) {
+    input = next;
+    EXPECT_THROW(runStages(folder_.path(), {}, stages, {}), Error);
+  }
+  EXPECT_EQ(ran, "begun resumed begun ");
+}
+
+TEST_F(Stages, RecordTheirWarningsOnceEach) {
+  int attempts = 0;
+  const std::vector<Stage> stages = {{.name = "one",
+                                      .run = [&](bool) -> std::string {
+                                        warn("in each attempt");
+                                        warn("attempt {}", ++attempts);
+                                        if (attempts < 2) throw Error("one", "", "fails", "repair it");
+                                        warn("{}", std::string(5000, 'x'));
+                                        return "done";
+                                      }},
+                                     {.name = "two", .run = [](bool) { return "done"; }}};
+  EXPECT_THROW(runStages(folder_.path(), {}, stages, {}), Error);
+  for (int i = 0; i < 2; ++i) {  // the second time, both are finished
+    runStages(folder_.path(), {}, stages, {});
+    const std::vector<StageRecord> records = readStageRecords(folder_.path());
+    ASSERT_EQ(records.size(), 2u);
+    ASSERT_EQ(records[0].warnings.size(), 4u);
+    EXPECT_EQ(records[0].warnings[0], "in each attempt");
+    EXPECT_EQ(records[0].warnings[1], "attempt 1");
+    EXPECT_EQ(records[0].warnings[2], "attempt 2");
+    EXPECT_LT(records[0].warnings[3].size(), 1100u);
+    EXPECT_TRUE(records[1].warnings.empty());
+  }
 }
 
 TEST_F(Stages, AreNotRepeated) {
