@@ -208,6 +208,17 @@ jitter() {
       (.; .frames[$i].tessera.exposure = $all[($i * 29 + 7) % ($all | length)])' "$work/jittered/transforms.json" > "$work/shuffled.partial/transforms.json"
     mv "$work/shuffled.partial" "$work/shuffled"
   }
+  # The capture states the true exposures, which are those that import reads from EXIF.
+  [ -e "$work/jittered-exif/transforms.json" ] || {
+    rm -rf "$work/jittered-unexposed"
+    cp -r "$work/jittered" "$work/jittered-unexposed"
+    jq 'del(.frames[].tessera.exposure)' "$work/jittered/transforms.json" > "$work/jittered-unexposed/transforms.json"
+    "$tessera" import "$work/jittered-unexposed" "$work/jittered-exif"
+  }
+  verdict "city with jitter, largest difference of an exposure by EXIF from the true one, in stops" \
+    "$(jq -n --slurpfile exif "$work/jittered-exif/transforms.json" --slurpfile true "$work/jittered/transforms.json" '
+      def exposures: [.[0].frames | sort_by(.file_path)[].tessera.exposure]; [$exif, $true | exposures] | transpose
+      | map(.[0] - .[1] | fabs) | max')" '<=' 0.01
   local method=${METHOD:-hash}
   for seed in ${SEEDS:-1 2 3}; do
     steady+=("$(scene_of steady "$method" "$seed" steady)") jittered+=("$(scene_of jittered "$method" "$seed" steady)")

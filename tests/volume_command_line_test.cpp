@@ -74,15 +74,30 @@ TEST_F(VolumeCommandLine, PredictsExposuresWhereExifExplainsThem) {
   const Said synthesised = run({"synth", "city", at("jittered"), "--blocks", "1x1", "--photos", "16", "--size", "48x36",
                                 "--samples", "1", "--seed", "3", "--exposure-jitter", "1"});
   ASSERT_EQ(synthesised.exitCode, 0) << synthesised.err;
+  // The exposures are forgotten, and read from EXIF.
+  const fs::path transforms = fs::path(at("jittered")) / "transforms.json";
+  json capture = json::parse(readTextFile(transforms));
+  std::map<std::string, double> exposures;
+  for (json& frame : capture["frames"]) {
+    exposures[fs::path(frame["file_path"].get<std::string>()).stem()] = frame["tessera"]["exposure"].get<double>();
+    frame["tessera"].erase("exposure");
+  }
+  writeFileAtomically(transforms, capture.dump());
+  const Said imported = run({"import", at("jittered"), at("by-exif")});
+  ASSERT_EQ(imported.exitCode, 0) << imported.err;
+  for (const json& frame : json::parse(readTextFile(fs::path(at("by-exif")) / "transforms.json"))["frames"]) {
+    const std::string name = fs::path(frame["file_path"].get<std::string>()).stem();
+    EXPECT_NEAR(frame["tessera"]["exposure"].get<double>(), exposures.at(name), 0.01) << name;
+  }
   std::vector<std::string> arguments = trainArguments(at("exposed"), {"--steps", "200"});
-  arguments[1] = at("jittered");
+  arguments[1] = at("by-exif");
   ASSERT_EQ(run(arguments).exitCode, 0);
   ASSERT_EQ(run({"bake", at("exposed"), at("exposed.scene")}).exitCode, 0);
   for (const std::string& what : {at("exposed"), at("exposed.scene")}) {
-    const Said said = run({"eval", what, at("jittered"), "--exposure", "predicted"});
+    const Said said = run({"eval", what, at("by-exif"), "--exposure", "predicted"});
     EXPECT_EQ(said.exitCode, 0) << said.err;
     EXPECT_TRUE(contains(said.out + said.err, "exposure predicted from EXIF")) << said.out << said.err;
-    const Said chosen = run({"eval", what, at("jittered"), "--exposure", "auto"});
+    const Said chosen = run({"eval", what, at("by-exif"), "--exposure", "auto"});
     EXPECT_TRUE(contains(chosen.out, "exposure predicted from EXIF")) << chosen.out << chosen.err;
   }
   for (const std::string& what : {model(), scene()}) {
