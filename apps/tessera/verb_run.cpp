@@ -8,6 +8,7 @@
 #include "apps/tessera/serving.h"
 #include "apps/tessera/verbs.h"
 #include "base/error.h"
+#include "compute/cpu/simd_targets.h"
 #include "photogrammetry/frame_choice.h"
 #include "pipeline/photo_run.h"
 #include "pipeline/run_request.h"
@@ -24,11 +25,21 @@ std::vector<std::string> bakedMethods() {
   return names;
 }
 
+// How many times as long steps take as with AVX-512, with which costs were measured. On a machine with AVX2 whose other
+// work was as fast, those of `hash` and `volume` took 1.3 times as long; shorter vectors have not been measured.
+double vectorSlowness() {
+  const std::string best = cpu::simdTargets().front();
+  if (best.starts_with("AVX3")) return 1;
+  return best == "AVX2" ? 1.3 : 2;
+}
+
 // An H200 trains 28 to 40 times the rays of MethodCosts::raysPerSecond in the same time, which depends on the method;
 // smaller GPUs are taken to train ten times as many.
 TrainingCosts typicalCosts(const MethodCosts& costs, bool onGpu) {
   const double speed = onGpu ? 10 : 1;
   return {.secondsPerStep = costs.secondsPerStep / speed,
+          .secondsPerLaterStep = costs.secondsPerLaterStep / speed,
+          .slowness = onGpu ? 1 : vectorSlowness(),
           .raysPerSecond = costs.raysPerSecond * speed,
           .bakeSeconds = costs.bakeSeconds,
           .secondsPerBakedMegapixel = costs.secondsPerBakedMegapixel / speed,

@@ -33,8 +33,8 @@ void PhotoModels::adjustBundle(const char* step, const fs::path& input, const fs
 }
 
 void PhotoModels::discardMapped() const {
-  for (const char* name :
-       {"snapshots", "snapshot.begun", "sparse.partial", "sparse.continued", "sparse.whole", "rest.partial"})
+  for (const char* name : {"snapshots", "snapshot.begun", "sparse.partial", "sparse.continued", "sparse.whole",
+                           "sparse.finished", "rest.partial"})
     removeFolder(folder_ / name);
 }
 
@@ -140,7 +140,7 @@ int PhotoModels::join(const Watch& watch) {
 
 void PhotoModels::extend(bool resumes, const Watch& watch) {
   const fs::path input = last(false), partial = folder_ / "extended.partial";
-  runMapper(input, partial, resumes, watch);
+  runMapper(input, partial, {}, resumes, watch);
   std::error_code status;
   if (photosIn(partial).size() >= photosIn(input).size()) {
     discardAdjusted();

@@ -28,8 +28,8 @@ class PhotoModels {
   // Called twice a second; what it throws ends the program that runs.
   using Watch = std::function<void(int64_t photosInModel)>;
 
-  // Estimates poses. `resumes`: goes on from the last snapshot of a call that was interrupted. Throws Error if no model
-  // results.
+  // Estimates poses. `resumes`: keeps the models that an interrupted call has finished, and goes on from its last
+  // snapshot of another. Throws Error if no model results.
   void map(bool resumes, const Watch& watch);
 
   void discardMapped() const;  // what an interrupted `map` would go on with
@@ -82,7 +82,12 @@ class PhotoModels {
   std::set<int> notIn(const std::vector<Piece>& pieces) const;             // the photos that none of these models has
   // Returns these photos, and those that are well matched with one of them.
   std::set<int> withMatched(std::set<int> photos) const;
-  void runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch);
+  // Goes on from a snapshot if `resumes` and there is one, else from the model `input`, unless that is empty. `photos`:
+  // all, if empty.
+  void runMapper(const fs::path& input, const fs::path& output, const std::set<int>& photos, bool resumes,
+                 const Watch& watch);
+  // Writes a list of these photos for COLMAP, and returns its path.
+  std::string writeNames(const char* file, const std::set<int>& photos) const;
   void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look,
                  const std::function<bool()>& isDone = {});
   // Adjusts all poses, points and lenses of a model; the principal points only if `movesPrincipalPoint`. Throws Error

@@ -60,6 +60,42 @@ void thinSnapshots(const fs::path& folder) {
   for (size_t i = kKeptSnapshots; i < complete.size(); ++i) fs::remove_all(complete[i].second, status);
 }
 
+// Returns the number of models in a folder, of which the last one may not be written to its end.
+size_t countBegun(const fs::path& models) {
+  size_t count = 0;
+  std::error_code status;
+  for (const fs::directory_entry& entry : fs::directory_iterator(models, status))
+    count += statedPhotos(entry.path()) > 0 ? 1 : 0;
+  return count;
+}
+
+// Removes the snapshots of models that are finished; returns whether one is left to go on from.
+bool dropSnapshots(const std::vector<Piece>& finished, const std::vector<fs::path>& snapshots) {
+  constexpr size_t kOfTen = 9;  // photos: some may have been removed again; models share fewer
+  bool isLeft = false;
+  for (const fs::path& snapshot : snapshots) {
+    const std::set<int> photos = photosIn(snapshot);
+    const bool isOver = std::any_of(finished.begin(), finished.end(), [&](const Piece& piece) {
+      const auto shared = std::count_if(photos.begin(), photos.end(), [&](int p) { return piece.photos.contains(p); });
+      return 10 * static_cast<size_t>(shared) >= kOfTen * photos.size();
+    });
+    if (isOver) removeFolder(snapshot);
+    isLeft = isLeft || !isOver;
+  }
+  return isLeft;
+}
+
+// Moves a model to a number that is free in a folder, and returns where it is then.
+fs::path moveInto(const fs::path& model, const fs::path& models) {
+  makeFolder(models);
+  for (int i = 0;; ++i) {
+    const fs::path place = models / std::to_string(i);
+    if (fs::exists(place)) continue;
+    fs::rename(model, place);
+    return place;
+  }
+}
+
 // Whether the mapper has come to its end, which it says last, with a model in a folder, or in a folder in it. It writes
 // each model when that is finished.
 bool hasFinished(const fs::path& folder, const fs::path& log) {
@@ -89,7 +125,8 @@ std::vector<std::string> PhotoModels::mapperArguments(const fs::path& output) co
           "--Mapper.ba_global_points_ratio", "1.2", "--Mapper.ba_global_max_refinements", "2"};
 }
 
-void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool resumes, const Watch& watch) {
+void PhotoModels::runMapper(const fs::path& input, const fs::path& output, const std::set<int>& photos, bool resumes,
+                            const Watch& watch) {
   const fs::path log = folder_ / "mapping.log", snapshots = folder_ / "snapshots", begun = folder_ / "snapshot.begun";
   std::error_code status;
   if (!resumes) fs::remove_all(begun, status);
@@ -106,9 +143,18 @@ void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool 
   std::vector<std::string> arguments = mapperArguments(output);
   arguments.insert(arguments.end(), {"--Mapper.init_min_tri_angle", "8", "--Mapper.snapshot_path", snapshots.string(),
                                      "--Mapper.snapshot_images_freq", std::to_string(kPhotosPerSnapshot)});
+  if (!photos.empty()) arguments.insert(arguments.end(), {"--image_list_path", writeNames("mapped.txt", photos)});
   const fs::path from = photosIn(begun).empty() ? input : begun;
   if (!from.empty()) arguments.insert(arguments.end(), {"--input_path", from.string()});
+  size_t finished = 0;
   const auto look = [&] {
+    // When a model is finished, the snapshots are of it, and larger than the first ones of the next.
+    if (countBegun(output) > finished && piecesIn(output).size() > finished) {
+      std::error_code ignored;  // the folder itself stays, as the mapper may write into it
+      for (const fs::directory_entry& entry : fs::directory_iterator(snapshots, ignored))
+        fs::remove_all(entry.path(), ignored);
+      ++finished;
+    }
     thinSnapshots(snapshots);
     watch(lastRegistered(log));
   };
@@ -116,23 +162,48 @@ void PhotoModels::runMapper(const fs::path& input, const fs::path& output, bool 
   requireWhole(output);
 }
 
+std::string PhotoModels::writeNames(const char* file, const std::set<int>& photos) const {
+  std::string names;
+  for (const int i : photos) names += list_.photos[static_cast<size_t>(i)].safeName + "\n";
+  writeFileAtomically(folder_ / file, names);
+  return (folder_ / file).string();
+}
+
 void PhotoModels::map(bool resumes, const Watch& watch) {
-  // What the mapper has finished is kept until `join`: as `continued` if it went on from a snapshot, else as `whole`.
+  // What the mapper has finished is kept until `join`: as `continued` if it went on from a snapshot, else as `whole`;
+  // as `finished` while it is at the next model.
   const fs::path partial = folder_ / "sparse.partial", continued = folder_ / "sparse.continued",
-                 whole = folder_ / "sparse.whole";
+                 whole = folder_ / "sparse.whole", finished = folder_ / "sparse.finished";
   const auto discardFinished = [&] {
-    for (const fs::path& folder : {continued, whole}) removeFolder(folder);
+    for (const fs::path& folder : {continued, whole, finished}) removeFolder(folder);
   };
   if (!resumes) discardFinished();
   if (!fs::exists(continued) && !fs::exists(whole)) {
-    try {
-      runMapper({}, partial, resumes, watch);
-    } catch (const Error&) {
-      // Without any model, the mapper reports failure, too.
-      if (readEnd(folder_ / "mapping.log").find(kNoModel) == std::string::npos) throw;
+    if (resumes) {
+      moveIntoSubfolder(partial);
+      for (const Piece& piece : piecesIn(partial)) moveInto(piece.folder, finished);
     }
-    const bool wentOn = moveIntoSubfolder(partial);
+    const std::vector<Piece> before = piecesIn(finished);
+    std::vector<fs::path> snapshots;
+    for (const Piece& piece : piecesIn(folder_ / "snapshots")) snapshots.push_back(piece.folder);
+    if (!photosIn(folder_ / "snapshot.begun").empty()) snapshots.push_back(folder_ / "snapshot.begun");
+    // Those that are left to map if no snapshot tells how.
+    std::set<int> photos;
+    const bool isAtNext = !before.empty() && !dropSnapshots(before, snapshots);
+    if (isAtNext) photos = withMatched(notIn(before));
+    bool wentOn = false;
+    if (!isAtNext || photos.size() >= kLeastShared) {
+      try {
+        runMapper({}, partial, photos, resumes, watch);
+      } catch (const Error&) {
+        // Without any model, the mapper reports failure, too.
+        if (readEnd(folder_ / "mapping.log").find(kNoModel) == std::string::npos) throw;
+      }
+      wentOn = moveIntoSubfolder(partial);
+    }
+    for (const Piece& piece : before) moveInto(piece.folder, partial);
     replaceFolder(partial, wentOn ? continued : whole);
+    removeFolder(finished);
   }
   const bool wentOn = fs::exists(continued);
   removeFolder(partial);
@@ -240,18 +311,15 @@ void PhotoModels::mapLinked(const fs::path& models, const Watch& watch) {
 
 std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<int>& photos, const Beginning& beginning,
                                         const Watch& watch) {
-  const fs::path list = folder_ / "rest.txt", rest = folder_ / "rest.partial";
-  std::string names;
-  for (const int i : photos) names += list_.photos[static_cast<size_t>(i)].safeName + "\n";
-  writeFileAtomically(list, names);
+  const fs::path rest = folder_ / "rest.partial";
   removeFolder(rest);
   makeFolder(rest);
   const fs::path log = folder_ / "mapping.log";
   std::error_code status;
   fs::remove(log, status);
   std::vector<std::string> arguments = mapperArguments(rest);
-  arguments.insert(arguments.end(), {"--image_list_path", list.string(), "--Mapper.init_min_tri_angle", "4",
-                                     "--Mapper.init_min_num_inliers", "50"});
+  arguments.insert(arguments.end(), {"--image_list_path", writeNames("rest.txt", photos), "--Mapper.init_min_tri_angle",
+                                     "4", "--Mapper.init_min_num_inliers", "50"});
   if (!beginning.model.empty()) arguments.insert(arguments.end(), {"--input_path", beginning.model.string()});
   if (const auto& pair = beginning.pair) {
     // Without the limit, all further models would begin with the same pair.
@@ -271,12 +339,7 @@ std::vector<Piece> PhotoModels::mapOnly(const fs::path& models, const std::set<i
   }
   moveIntoSubfolder(rest);
   std::vector<Piece> added = piecesIn(rest);
-  for (Piece& piece : added) {
-    fs::path place;
-    for (int i = 0; place.empty() || fs::exists(place, status); ++i) place = models / std::to_string(i);
-    fs::rename(piece.folder, place);
-    piece.folder = place;
-  }
+  for (Piece& piece : added) piece.folder = moveInto(piece.folder, models);
   fs::remove_all(rest, status);
   return added;
 }

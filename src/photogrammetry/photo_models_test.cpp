@@ -188,6 +188,47 @@ TEST_F(PhotoModelsTest, GoOnFromTheLastSnapshotThatIsWhole) {
   EXPECT_EQ(estimated.read().capture.photos.size(), 18u) << "models remain until others replace them";
 }
 
+// A folder of two places: the mapper is at the second one when it is killed.
+TEST_F(PhotoModelsTest, GoOnFromASnapshotBesideModelsThatAreFinished) {
+  const std::string runs = (folder_ / "runs").string();
+  const std::string first = "if [ -n \"$image_list_path\" ]; then echo rest >> " + runs +
+                            "; echo failed to create sparse model; exit 1; fi\n"
+                            "if [ -n \"$input_path\" ]; then echo onward >> " +
+                            runs + "; cp " + prepared("b", numbers(25, 45)) +
+                            "/* $output_path; exit; fi\n"
+                            "echo first >> " +
+                            runs + "; cp -r " + prepared("small", numbers(0, 12)) + " $Mapper_snapshot_path/1; cp -r " +
+                            prepared("a", numbers(0, 20)) + " $output_path/0\n";
+  const std::string kill = "kill -9 $$";
+  PhotoModels estimated =
+      models(first + "cp -r " + prepared("begun", numbers(25, 30)) + " $Mapper_snapshot_path/2\n" + kill, true);
+  EXPECT_THROW(estimated.map(false, ignore), ColmapKilled);
+  estimated.map(true, ignore);
+  EXPECT_EQ(readTextFile(runs), "first\nonward\nrest\n");
+  EXPECT_EQ(estimated.countMapped().models, 2u);
+  EXPECT_EQ(estimated.countMapped().photos, 40u);
+  EXPECT_FALSE(fs::exists(folder_ / "poses/sparse.finished"));
+
+  // Before the second one has a snapshot, those of the first are of no use: what is left is mapped on its own.
+  fs::remove(runs);
+  PhotoModels early = models(first + kill, true);
+  EXPECT_THROW(early.map(false, ignore), ColmapKilled);
+  early.map(true, ignore);
+  EXPECT_EQ(readTextFile(runs), "first\nrest\nrest\n") << "with snapshots, and for those that are left then";
+  EXPECT_EQ(readTextFile(folder_ / "poses/mapped.txt").substr(0, 8), "p20.jpg\n");
+  EXPECT_EQ(early.countMapped().photos, 20u);
+}
+
+TEST_F(PhotoModelsTest, KeepNoSnapshotsOfModelsThatAreFinished) {
+  PhotoModels estimated = models(
+      "cp -r " + prepared("a", numbers(0, 20)) + " $Mapper_snapshot_path/1; cp -r " + prepared("b", numbers(0, 30)) +
+      " $output_path/0; for i in $(seq 100); do [ -e $Mapper_snapshot_path/1 ] || break; sleep 0.2; done; cp -r " +
+      prepared("c", numbers(40, 45)) + " $Mapper_snapshot_path/2; sleep 1; exit 1");
+  EXPECT_THROW(estimated.map(false, ignore), Error);
+  EXPECT_FALSE(fs::exists(folder_ / "poses/snapshots/1"));
+  EXPECT_TRUE(fs::exists(folder_ / "poses/snapshots/2"));
+}
+
 // An interruption while further models are made costs only these.
 TEST_F(PhotoModelsTest, AreNotMappedAgainIfOnlyFurtherOnesWereInterrupted) {
   const std::string runs = (folder_ / "runs").string();

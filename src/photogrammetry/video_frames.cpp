@@ -160,13 +160,13 @@ VideoStream VideoFrames::inspect(const Watch& watch) {
   }
   stream_ = parseVideoStream(text);
   if (!stream_) throw Error(video_.string(), "", "has no video stream", remedy);
-  if (stream_->isHdr)
-    warn("{}: its colours are HDR, which are not converted: the scene will look dull; export it as SDR",
-         video_.string());
   return *stream_;
 }
 
 void VideoFrames::choose(const Watch& watch) {
+  if (stream_ && stream_->isHdr)
+    warn("{}: its colours are HDR, which are not converted: the scene will look dull; export it as SDR",
+         video_.string());
   if (!readChosen(listFile(), origin()).empty()) return;
   std::error_code status;
   fs::create_directories(folder_, status);

@@ -35,7 +35,8 @@ class VideoFrames {
   // Returns what the file states of its pictures, which it reads once. Throws Error if it is no video, or the program
   // is missing.
   VideoStream inspect(const Watch& watch);
-  // Chooses frames, unless that has been done. Throws Error if the video has fewer than three or cannot be decoded.
+  // Chooses frames, unless that has been done, and warns of HDR if it has been inspected. Throws Error if the video has
+  // fewer than three or cannot be decoded.
   void choose(const Watch& watch);
   size_t chosen() const;  // how many
   // Stores the chosen frames that are not there yet. Throws Error if the program fails.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 #include <nlohmann/json.hpp>
 #include <set>
 
@@ -45,6 +46,10 @@ bool isReadable(const std::function<void()>& read) {
   } catch (const Error&) {
     return false;
   }
+}
+
+bool isOfFrames(const RunPlan::Entry& entry) {
+  return entry.stage == "frames";
 }
 
 class PhotoRun {
@@ -166,7 +171,9 @@ class PhotoRun {
     frames.run = [this, take = frames.run](bool resumes) {
       std::string summary = take(resumes);
       list();
-      announcePlan(planStages(options_.out, this->stages(), options_.range), options_.out);
+      RunPlan plan = planStages(options_.out, this->stages(), options_.range);
+      std::erase_if(plan.entries, isOfFrames);
+      announcePlan(plan, options_.out);
       return summary;
     };
     stages.insert(stages.begin(), std::move(frames));
@@ -243,7 +250,7 @@ class PhotoRun {
         throw;
       } catch (const Error& error) {
         stopIfInterrupted();
-        warn("photos without GPS are only compared with those before and after them: {}", error.what());
+        warn("photos that GPS does not place are only compared with those before and after them: {}", error.what());
       }
     }
     const ChosenPairs chosen{photosDigest_, choosePairs(list_, lookAlikes), lookAlikes};
@@ -473,7 +480,7 @@ void runFromPhotos(const PhotoRunOptions& options) {
   RunPlan plan = planStages(options.out, stages, options.range);
   if (!run.isListed()) {
     inform("what the stages after `frames` take is known when the frames are there");
-    std::erase_if(plan.entries, [](const RunPlan::Entry& entry) { return entry.stage != "frames"; });
+    std::erase_if(plan.entries, std::not_fn(isOfFrames));
   }
   if (options.dryRun) fmt::print("{}", describePlan(plan));
   announcePlan(plan, options.out, run.isListed() ? "this" : "frames");

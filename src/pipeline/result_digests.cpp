@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "base/file_digest.h"
 #include "pipeline/stage.h"
@@ -32,6 +33,10 @@ std::string modelDigest(const fs::path& model) {
     for (const auto& checkpoint : manifest["files"])
       if (checkpoint.is_string()) text += fileDigest(model / checkpoint.get<std::string>()) + "\n";
   }
+  // Coarser levels of detail are models of their own, whose manifests name their checkpoints.
+  std::set<fs::path> levels;
+  for (const fs::directory_entry& level : fs::directory_iterator(model / "levels", status)) levels.insert(level.path());
+  for (const fs::path& level : levels) text += fileDigest(level / "manifest.json") + "\n";
   return textDigest(text);
 }
 

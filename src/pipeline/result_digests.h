@@ -16,7 +16,8 @@ std::string photosDigest(const std::vector<ListedPhoto>& photos);
 // Returns a digest of which photos are left out and why.
 std::string leftOutDigest(const std::vector<LeftOutPhoto>& photos);
 
-// Returns a digest of a model's settings, blocks and last checkpoint; empty if there is no model in the folder.
+// Returns a digest of a model's settings, blocks, last checkpoint and coarser levels; empty if there is no model in the
+// folder.
 std::string modelDigest(const fs::path& model);
 
 // Returns a digest of a scene, whose files are named by what they contain; empty if there is none in the folder.

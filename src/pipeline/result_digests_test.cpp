@@ -16,7 +16,8 @@ TEST(ResultDigests, TellModelsApartByTheirManifestSettingsAndCheckpoints) {
       {"manifest.json", R"({"files": ["blocks/0/step-20.safetensors"]})"},
       {"config.toml", "width = 16"},
       {"blocks.json", "{}"},
-      {"blocks/0/step-20.safetensors", "numbers"}};
+      {"blocks/0/step-20.safetensors", "numbers"},
+      {"levels/1/manifest.json", "{}"}};
   for (const auto& [name, text] : files) writeFileAtomically(folder / name, std::string_view(text));
   const std::string digest = modelDigest(folder.path());
   std::set<std::string> digests{digest};
@@ -25,7 +26,7 @@ TEST(ResultDigests, TellModelsApartByTheirManifestSettingsAndCheckpoints) {
     digests.insert(modelDigest(folder.path()));
     writeFileAtomically(folder / name, std::string_view(text));
   }
-  EXPECT_EQ(digests.size(), 5u);
+  EXPECT_EQ(digests.size(), 6u);
   EXPECT_EQ(modelDigest(folder.path()), digest);
   for (const char* damaged : {"", "[]", "{\"files\": 1}", "{\"files\": [1]}"}) {
     writeFileAtomically(folder / "manifest.json", std::string_view(damaged));

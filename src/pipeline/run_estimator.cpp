@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <thread>
 
+#include "base/error.h"
 #include "base/order_statistics.h"
 #include "import/holdout.h"
 #include "pipeline/pairs_json.h"
@@ -37,12 +38,16 @@ std::optional<MatchingRates> RunEstimator::readRates(const std::string& key) con
   return fs::exists(file, status) ? decodeMatchingRates(readTextFile(file), key) : std::nullopt;
 }
 
-// How fast the machine is, another number of threads tells as well: no program is needed to measure it again.
+// Rates for stages that need no COLMAP, which the machine that trains may lack: by order of magnitude, those of another
+// number of threads, or of photos of this size.
 MatchingRates RunEstimator::anyRates() {
-  if (!rates_) {
-    if (const auto others = readRates(photosDigest_ + " ")) return *others;
+  try {
+    return rates();
+  } catch (const ColmapKilled&) {
+    throw;
+  } catch (const Error&) {
+    return readRates(photosDigest_ + " ").value_or(expectRates(list_));
   }
-  return rates();
 }
 
 // The number of pairs that are compared, as far as it is known before the look-alikes are.

@@ -60,10 +60,12 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
 // takes then). Zeros if the file does not state enough.
 StageNeeds planFrames(const VideoStream& stream, int count);
 
-// What a representation costs to train, bake and evaluate on two cores, by order of magnitude: measured on small
-// scenes, and for the blocks into which training divides a capture.
+// What a representation costs to train, bake and evaluate on two cores with AVX-512, by order of magnitude: measured on
+// small scenes, and for the blocks into which training divides a capture.
 struct TrainingCosts {
-  double secondsPerStep = 0.2;
+  double secondsPerStep = 0.2;     // at the beginning, and
+  double secondsPerLaterStep = 0;  // above 0: after 1500 steps
+  double slowness = 1;             // how many times as long steps take on this machine's vector unit
   double raysPerSecond = 20000;
   double bakeSeconds = 20;                 // whatever the photos, and
   double secondsPerBakedMegapixel = 1;     // of the training photos, if training has as many rays a second as above

@@ -119,6 +119,21 @@ TEST(RunPlan, GrowsWithPhotosAndMinutes) {
   EXPECT_EQ(planTraining(size, costs).evaluate.seconds, 0);
 }
 
+TEST(RunPlan, ExpectsStepsToTakeLongerUntilTheySettle) {
+  TrainingCosts costs{.secondsPerStep = 0.1, .secondsPerLaterStep = 0.3};
+  TrainingSize size{.photos = 10};
+  const auto seconds = [&](int64_t steps) {
+    size.steps = steps;
+    return planTraining(size, costs).train.seconds;
+  };
+  EXPECT_NEAR(seconds(1500) - seconds(0), 1500 * 0.2, 1e-6);
+  EXPECT_NEAR(seconds(300) - seconds(0), 300 * 0.12, 1e-6);
+  EXPECT_NEAR(seconds(2500) - seconds(1500), 1000 * 0.3, 1e-6);
+  const double start = seconds(0), fast = seconds(1000);
+  costs.slowness = 2;
+  EXPECT_NEAR(seconds(1000), 2 * fast - start, 1e-6);
+}
+
 TEST(RunPlan, AddsTheCoarserLevelsToTheMinutes) {
   TrainingCosts costs{.secondsPerStep = 0.1};
   const TrainingSize size{.photos = 100, .heldOut = 20, .photoPixels = 1000 * 1000, .minutes = 10};

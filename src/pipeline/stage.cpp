@@ -160,6 +160,8 @@ Remaining findRemaining(const fs::path& folder, const std::vector<Stage>& stages
                            (record->second.inputs.empty() || record->second.inputs == stage.inputs());
       if (isKnown && record->second.isFinished && stage.isComplete()) {
         remaining.known.push_back(record->second);
+        // What is there now counts as what it has read.
+        if (record->second.inputs.empty()) remaining.known.back().inputs = stage.inputs();
         ++remaining.first;
       } else {
         again = true;
@@ -250,6 +252,10 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
     if (before.is_object()) {
       before["request"] = request.command;
       before["flags"] = request.flags;
+      for (Json& stage : before["stages"]) {
+        for (size_t i = 0; i < remaining.first; ++i)
+          if (stage["name"] == stages[i].name) stage = toJson(stages[i].name, remaining.known[i]);
+      }
       write(before, file);
     }
   }

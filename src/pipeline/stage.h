@@ -24,8 +24,8 @@ struct StageNeeds {
 struct Stage {
   std::string name;
   std::string settings;  // what its result depends on, besides the results of earlier stages
-  // What else its result depends on, and what earlier stages are not alone to write; empty: nothing. It is called, and
-  // recorded, when the stage begins: a stage that has read something else is run again.
+  // Returns a digest of what else its result depends on: results of earlier stages that other programs may change, too.
+  // It is recorded when the stage begins, which is run again if it has another one. Empty: nothing.
   std::function<std::string()> inputs = [] { return std::string(); };
   std::function<bool()> isComplete = [] { return true; };  // whether what it wrote is still there
   // Removes what a result for other settings has left, which `run` must not use; called before it begins anew.

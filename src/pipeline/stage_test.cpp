@@ -130,6 +130,8 @@ TEST_F(Stages, AreRepeatedIfAnotherProgramHasChangedTheirInputs) {
   EXPECT_EQ(run(), "");
   stages[1].inputs = [&] { return input; };
   EXPECT_EQ(run(), "") << "runs of former versions record none";
+  input = "one more";
+  EXPECT_EQ(run(), "two three ") << "now they do";
 }
 
 TEST_F(Stages, AreNotResumedWithOtherInputs) {

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <csignal>
+#include <fstream>
+#include <set>
+#include <string_view>
 
 #include "base/child_process.h"
 #include "base/error.h"
@@ -23,6 +26,16 @@ bool isInterrupted(const ChildProcess& process) {
                      [&](int signal) { return process.signal() == signal || process.status() == kStatus + signal; });
 }
 
+// Repeats the warnings in a log behind its first `begin` bytes, once each.
+void repeatWarnings(const std::string& verb, const fs::path& log, uint64_t begin) {
+  constexpr std::string_view kWarning = "warning: ";
+  std::ifstream file(log, std::ios::binary);
+  file.seekg(static_cast<std::streamoff>(begin));
+  std::set<std::string> warnings;
+  for (std::string line; warnings.size() < WarningRecorder::kMaxRecorded && std::getline(file, line);)
+    if (line.starts_with(kWarning) && warnings.insert(line).second) warn("{}: {}", verb, line.substr(kWarning.size()));
+}
+
 }  // namespace
 
 std::string runVerb(const PhotoRunOptions& options, const std::string& verb, std::vector<std::string> arguments) {
@@ -30,6 +43,8 @@ std::string runVerb(const PhotoRunOptions& options, const std::string& verb, std
   arguments.insert(arguments.begin(), {options.program, verb, "--device", options.device});
   if (options.threads > 0) arguments.insert(arguments.end(), {"--threads", std::to_string(options.threads)});
   ChildProcess process;
+  std::error_code status;
+  const uint64_t before = fs::exists(log, status) ? fs::file_size(log) : 0;
   const std::string failure = process.start(arguments, {.log = log, .hasOwnGroup = true});
   if (!failure.empty()) throw Error(options.program, "", "cannot be run: " + failure, "install it again");
   const auto lastLine = [&process] {
@@ -46,6 +61,7 @@ std::string runVerb(const PhotoRunOptions& options, const std::string& verb, std
     asked = true;
   }
   echo.clear();
+  repeatWarnings(verb, log, before);
   const std::string end = process.wait();
   if (!end.empty()) {
     if (options.interrupted()) {

@@ -103,8 +103,8 @@ struct BakeParameter {
 };
 using BakeParameters = std::map<std::string, int64_t, std::less<>>;  // by name; given ones and defaults
 
-// What a method costs on a machine of two cores if the capture is one block, by order of magnitude: measured on a
-// capture of 15 photos of 400×225, `mesh` on one of 72 photos of 400×300 in four blocks. costsOnCapture
+// What a method costs on a machine of two cores with AVX-512 if the capture is one block, by order of magnitude:
+// measured on a capture of 15 photos of 400×225, `mesh` on one of 72 photos of 400×300 in four blocks. costsOnCapture
 // (method_costs.h) returns those of several blocks.
 struct MethodCosts {
   double secondsPerStep = 0;
@@ -115,6 +115,7 @@ struct MethodCosts {
   int64_t trainBytes = 0;                  // of memory, besides the photos
   int64_t modelBytes = 0;                  // on disk, the scene included
   double coarserLevels = 0;                // time for coarser levels of detail after the finest, as a share of its time
+  double secondsPerLaterStep = 0;          // above 0: of steps whose rays have become more, as there is less to sample
 };
 
 // A null function means that the method does not support it.

@@ -43,7 +43,8 @@ MethodCosts costsOnCapture(const Method& method, const Capture& capture, uint64_
   costs.modelBytes = std::llround(bytes);
   if (method.partsAlone) {
     costs.secondsPerStep *= blocks;  // each has all steps
-  } else if (gpuBytes == 0) {        // a GPU with memory of its own stores them
+    costs.secondsPerLaterStep *= blocks;
+  } else if (gpuBytes == 0) {  // a GPU with memory of its own stores them
     costs.trainBytes += static_cast<int64_t>((blocks - 1) * demand.limits.bytesPerBlock);
   }
   return costs;

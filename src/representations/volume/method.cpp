@@ -63,7 +63,7 @@ const Method& volumeMethod() {
       .summary = "texels of blocks in sparse voxels and planes, shaded once a pixel (City-on-Web, MERF)",
       .trainsInBlocks = true,
       .swapsBlocks = true,
-      .costs = {0.07, 40000, 8, 8, 5, int64_t{700} << 20, 120000000},
+      .costs = {0.084, 40000, 8, 8, 5, int64_t{700} << 20, 120000000, 0, 0.175},
       .settings = makeSettings<VolumeConfig>,
       .train = train,
       .blockDemand = blockDemand,
