@@ -21,6 +21,7 @@ import time
 SHORT_SECONDS = 3
 ATTEMPTS = 20  # to kill a short stage
 URGENCY = 15  # in steps of nice
+PAUSE = 1e-4  # seconds between looks at the record, so that they take no core
 
 
 def children(pid):
@@ -69,6 +70,20 @@ def trained_steps(out):
         return 0
 
 
+def changed(path):
+    """When a file was written last; 0 if it is not there."""
+    try:
+        return os.path.getmtime(path)
+    except OSError:
+        return 0
+
+
+def last_progress(out, stage):
+    """When something was recorded that is not repeated: a stage that has begun, or a checkpoint of the training."""
+    recorded = changed(os.path.join(out, "run.json"))
+    return max(recorded, changed(os.path.join(out, "model", "manifest.json"))) if stage == "train" else recorded
+
+
 def training_log(out):
     return os.path.join(out, "logs", "train.log")
 
@@ -112,6 +127,7 @@ def wait_for(stage, later, process, out, earlier):
     """Waits until a record that is newer than the `earlier` one says that the stage is in progress; returns whether it
     does, before one of the later stages, or the end."""
     while process.poll() is None:
+        time.sleep(PAUSE)
         current = stage_in_progress(out) if version(out) != earlier else None
         if current == stage:
             return True
@@ -178,17 +194,19 @@ def main():
                 in_progress = wait_for(name, names[names.index(name) + 1 :], process, out, earlier)
                 if name in long and in_progress:
                     time.sleep(random.uniform(0.05, 0.9) * unbroken[name] / kills)
-                was_running = process.poll() is None
+                was_running, killed_at = process.poll() is None, time.time()
                 programs, left = kill(process)
                 survivors += left
                 where = stage_in_progress(out) or "between stages"
+                repeated = killed_at - max(begin, last_progress(out, where))
                 note_resumed()
                 if where == "train" and trained_steps(out) > 0:
                     pending = {"step": trained_steps(out), "log_bytes": log_bytes(out)}
                 seconds = time.time() - begin - 1
                 attempts.append({"target": name, "killed_in": where, "running": was_running, "again": missed,
-                                 "seconds": seconds})
-                print(f"killed in {where} after {seconds:.1f} s, {programs} children, {left} survived", flush=True)
+                                 "seconds": seconds, "repeated_at_most": repeated})
+                print(f"killed in {where} after {seconds:.1f} s, at most {repeated:.1f} s repeated, "
+                      f"{programs} children, {left} survived", flush=True)
                 if was_running and where in reached:
                     reached[where] += 1
                 missed = where != name
@@ -200,12 +218,12 @@ def main():
     note_resumed()
     attempts.append({"target": None, "seconds": time.time() - begin, "status": process.returncode})
     kills = [attempt for attempt in attempts if attempt.get("running") and not attempt["again"]]
-    # What a kill destroys is at most what was done since the program had started, and on average what all attempts took
-    # longer than the unbroken run.
+    # What a kill destroys is at most what was done since the stage had begun or the program had started, and since the
+    # last checkpoint of the training; on average, what all attempts took longer than the unbroken run.
     seconds, whole = sum(attempt["seconds"] for attempt in attempts), sum(unbroken.values())
     json.dump({"attempts": attempts, "survivors": survivors, "kills": len(kills), "reached": reached,
                "status": attempts[-1]["status"], "seconds": seconds, "unbroken_seconds": whole,
-               "repeated_seconds_at_most": max(attempt["seconds"] for attempt in kills),
+               "repeated_seconds_at_most": max(attempt["repeated_at_most"] for attempt in kills),
                "repeated_seconds_mean": (seconds - whole) / len(kills), "resumed": resumed},
               open(record, "w"), indent=1)
 

@@ -10,7 +10,8 @@
 #             the right halves of the views at most 0.2 dB below fitted ones
 #   killed    brighton_beach to an evaluated scene of `volume`, killed 20 times, at least once in each stage: all photos get poses, at most
 #             three minutes are repeated each time, training goes on from a checkpoint, no program survives, and the scene has the
-#             bytes of an unbroken training; then the poses of the survey, killed 10 times more than it has stages
+#             bytes of an unbroken training
+#   killed_survey  the poses of the survey, killed 10 times more than it has stages
 #   against   brighton_beach at 400x225 and fox at 270x480, with the poses of `run` and with the poses that the data has: the scenes of
 #             ten minutes of the default method, held-out PSNR at most 0.3 dB lower, mean of the seeds
 #   methods   which method is best after ten minutes: scenes of brighton_beach, fox and a city of 2x2 blocks
@@ -23,7 +24,7 @@
 #   untagged  the same photographs as in survey, without EXIF and XMP: at least 95 % get poses, none more than 1 m off
 # Of each run: its time within twice what it had expected at the start, stages within 1.5 times, memory between half and all of it.
 # Resumable: everything is kept in build/bench/photos, and what exists is not made again.
-#   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox served against methods reduced exposure jitter killed survey sizes untagged"] \
+#   TESSERA_SHARED_DATA=DIR [ROWS="brighton fox served against methods reduced exposure jitter killed survey killed_survey sizes untagged"] \
 #     [SEEDS="1 2 3"] [MINUTES=10] [STEPS=N] [METHOD=hash] bench/photos.sh
 # With STEPS, trainings have that many steps instead of minutes, so that other programs do not matter; those of killed, 1500 if it is
 # not given, which take several checkpoints.
@@ -335,10 +336,11 @@ killed() {
   rm -rf "$work/killed" "$work/again"
   cp "$work/whole/run.json" "$record.unbroken"
   python3 bench/kill_run.py "$seed" 20 "$record" -- "$tessera" run "$photos" "$work/killed" "${method[@]}"
-  # What follows the capture, unbroken.
-  cp -r "$work/killed" "$work/again"
-  rm -rf "$work/again"/{model,model.earlier*,scene,eval.json}
-  "$tessera" run "$photos" "$work/again" "${method[@]}" --from train
+  # What follows the capture, unbroken. The scene has the name of the folder.
+  mkdir "$work/again"
+  cp -r "$work/killed" "$work/again/killed"
+  rm -rf "$work/again/killed"/{model,model.earlier*,scene,eval.json}
+  "$tessera" run "$photos" "$work/again/killed" "${method[@]}" --from train
   verdict "brighton_beach, killed, registered of 18" "$(registered killed)" '>=' 18
   verdict "the same, kills" "$(jq .kills "$record")" '>=' 20
   verdict "the same, stages in which it was killed, of $(jq '.reached | length' "$record")" \
@@ -350,12 +352,15 @@ killed() {
   verdict "the same, of these, trainings that did not go on from it" \
     "$(jq '[.resumed[] | select(.first_step < .checkpoint_step)] | length' "$record")" '<=' 0
   verdict "the same, files of the scene that differ from the unbroken one" \
-    "$(diff -rq "$work/killed/scene" "$work/again/scene" 2>&1 | wc -l)" '<=' 0
-  # Long enough that the mapper takes snapshots.
+    "$(diff -rq "$work/killed/scene" "$work/again/killed/scene" 2>&1 | wc -l)" '<=' 0
+}
+
+# Long enough that the mapper takes snapshots.
+killed_survey() {
+  local seed=${SEED:-1} record=$work/survey-killed.json
   truth survey 2x2 75
   [ -s "$work/survey/run.json" ] || posed survey "$work/survey-photos"
   rm -rf "$work/survey-killed"
-  record=$work/survey-killed.json
   cp "$work/survey/run.json" "$record.unbroken"
   python3 bench/kill_run.py "$seed" "$((10 + $(jq '.stages | length' "$work/survey/run.json")))" "$record" -- \
     "$tessera" run "$work/survey-photos" "$work/survey-killed" --until capture --holdout none
@@ -367,5 +372,5 @@ killed() {
   verdict "the same, seconds repeated for a kill, mean" "$(jq .repeated_seconds_mean "$record")" '<=' 180
 }
 
-for row in ${ROWS:-brighton fox served against methods reduced exposure jitter killed survey sizes untagged}; do "$row"; done
+for row in ${ROWS:-brighton fox served against methods reduced exposure jitter killed survey killed_survey sizes untagged}; do "$row"; done
 finish
