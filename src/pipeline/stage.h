@@ -25,7 +25,7 @@ struct Stage {
   std::string name;
   std::string settings;  // what its result depends on, besides the results of earlier stages
   // Returns a digest of what else its result depends on: results of earlier stages that other programs may change, too.
-  // It is recorded when the stage begins, which is run again if it has another one. Empty: nothing.
+  // It is recorded when the stage begins; a stage whose digest has changed since is run again. Empty: nothing.
   std::function<std::string()> inputs = [] { return std::string(); };
   std::function<bool()> isComplete = [] { return true; };  // whether what it wrote is still there
   // Removes what a result for other settings has left, which `run` must not use; called before it begins anew.
