@@ -412,13 +412,14 @@ TEST_F(VolumeCommandLine, ExplainsWhatIsWrongWithModelsAndScenes) {
 
 TEST_F(VolumeCommandLine, RendersAWorldByVulkanAndExplainsWhatIsWrongWithIt) {
   const fs::path file = folder_ / "worlds/world.json";
-  const auto rendered = [&](const std::string& device, const std::string& url) {
+  const auto rendered = [&](const std::string& device, const std::string& url, const std::string& level = "0") {
     const json world = {{"kind", "tessera world"},
                         {"version", 2},
                         {"scenes", {{{"url", url}}, {{"url", url}, {"position", {30, 0, 0}}, {"visible", false}}}}};
     writeFileAtomically(file, std::string_view(world.dump()));
     const std::string out = at("world-" + device);
-    return run({"render", file.string(), out, "--views", at("city"), "--size", "32x24", "--device", device});
+    return run(
+        {"render", file.string(), out, "--views", at("city"), "--size", "32x24", "--device", device, "--lod", level});
   };
   scene();
   const Said onCpu = rendered("cpu", "../scene");
@@ -427,6 +428,11 @@ TEST_F(VolumeCommandLine, RendersAWorldByVulkanAndExplainsWhatIsWrongWithIt) {
   const Said lacking = rendered("cpu", "gone");
   EXPECT_EQ(lacking.exitCode, 1);
   EXPECT_TRUE(contains(lacking.err, "world.json: scenes[0].url: there is no scene in")) << lacking.err;
+  const Said tooCoarse = rendered("cpu", "../scene", "2");
+  EXPECT_EQ(tooCoarse.exitCode, 1);
+  EXPECT_TRUE(
+      contains(tooCoarse.err, "world.json: --lod 2: the coarsest level of its scenes is 1; name that or a finer one"))
+      << tooCoarse.err;
   const Said drawn = rendered("vulkan", "../scene");
   if (contains(drawn.err, "no Vulkan")) GTEST_SKIP() << drawn.err;
   EXPECT_EQ(drawn.exitCode, 0) << drawn.err;

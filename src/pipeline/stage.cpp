@@ -254,7 +254,7 @@ void runStages(const fs::path& folder, const RunRequest& request, const std::vec
       before["flags"] = request.flags;
       for (Json& stage : before["stages"]) {
         for (size_t i = 0; i < remaining.first; ++i)
-          if (stage["name"] == stages[i].name) stage = toJson(stages[i].name, remaining.known[i]);
+          if (stage.is_object() && stage["name"] == stages[i].name) stage = toJson(stages[i].name, remaining.known[i]);
       }
       write(before, file);
     }

@@ -307,6 +307,15 @@ TEST_F(Stages, SurviveADamagedRecord) {
   }
 }
 
+TEST_F(Stages, AreNotRepeatedIfTheRecordHoldsOtherThingsToo) {
+  run({"", "", ""});
+  std::string record = readTextFile(folder_ / "run.json");
+  record.insert(record.find("\"stages\": [") + std::string("\"stages\": [").size(), "3, [], {}, {\"name\": 5},");
+  writeFileAtomically(folder_ / "run.json", record);
+  EXPECT_EQ(run({"", "", ""}), "");
+  EXPECT_EQ(readStageRecords(folder_.path()).size(), 3u);
+}
+
 // Three stages of a minute each, of which a resumed one takes half a minute.
 std::vector<Stage> minutesEach(const std::function<void(const std::string&)>& run) {
   std::vector<Stage> stages;
