@@ -4,8 +4,9 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <numeric>
+#include <optional>
 #include <set>
+#include <tuple>
 
 #include "photogrammetry/photo_footprints.h"
 
@@ -26,8 +27,8 @@ PhotoPair inOrder(int a, int b) {
   return {std::min(a, b), std::max(a, b)};
 }
 
-void pairInSequence(const PhotoList& list, const std::vector<bool>& tellPlace, const PairOptions& options,
-                    std::set<PhotoPair>& pairs) {
+// Returns the photos of each flight in the order in which they were taken.
+std::map<int, std::vector<int>> flightsInOrder(const PhotoList& list) {
   std::map<int, std::vector<int>> flights;
   for (size_t i = 0; i < list.photos.size(); ++i) flights[list.photos[i].flight].push_back(static_cast<int>(i));
   for (auto& [flight, photos] : flights) {
@@ -35,6 +36,13 @@ void pairInSequence(const PhotoList& list, const std::vector<bool>& tellPlace, c
       return list.photos[static_cast<size_t>(a)].tags.takenAt.value_or(0) <
              list.photos[static_cast<size_t>(b)].tags.takenAt.value_or(0);
     });
+  }
+  return flights;
+}
+
+void pairInSequence(const PhotoList& list, const std::vector<bool>& tellPlace, const PairOptions& options,
+                    std::set<PhotoPair>& pairs) {
+  for (const auto& [flight, photos] : flightsInOrder(list)) {
     for (size_t i = 0; i < photos.size(); ++i) {
       for (size_t k = i + 1; k < photos.size(); ++k) {
         const bool tell = tellPlace[static_cast<size_t>(photos[i])] && tellPlace[static_cast<size_t>(photos[k])];
@@ -47,60 +55,107 @@ void pairInSequence(const PhotoList& list, const std::vector<bool>& tellPlace, c
 }
 
 struct Candidate {
-  double overlap;
-  int a, b;  // indices into the footprints
+  double overlap = 0;
+  int a = 0, b = 0;  // indices into the footprints, the smaller one first
+
+  int other(int one) const { return one == a ? b : a; }
 };
 
+bool hasMoreOverlap(const Candidate& x, const Candidate& y) {
+  return std::tuple(-x.overlap, x.b - x.a, x.a) < std::tuple(-y.overlap, y.b - y.a, y.a);
+}
+
+// A spanning tree of footprints by overlap, of each group that overlaps, grown from one of them (Prim). It holds one
+// pair of each footprint, not all pairs, of which a large survey has many millions.
+class SpanningTree {
+ public:
+  explicit SpanningTree(size_t count) : best_(count), isInside_(count, false) {}
+
+  // Returns the footprint that joins the tree next, and the pair by which it does: without overlap, if it begins a
+  // group. To be called once for each footprint.
+  std::pair<int, Candidate> grow() {
+    std::optional<size_t> next;
+    for (size_t i = 0; i < best_.size(); ++i)
+      if (!isInside_[i] && (!next || hasMoreOverlap(best_[i], best_[*next]))) next = i;
+    isInside_[*next] = true;
+    return {static_cast<int>(*next), best_[*next]};
+  }
+
+  // Takes a pair of the footprint that has joined.
+  void offer(int inside, const Candidate& pair) {
+    const auto other = static_cast<size_t>(pair.other(inside));
+    if (!isInside_[other] && hasMoreOverlap(pair, best_[other])) best_[other] = pair;
+  }
+
+ private:
+  std::vector<Candidate> best_;  // by which each would join the tree, or has
+  std::vector<bool> isInside_;
+};
+
+// Of the photos that overlap with one of a list, the one with the most overlap first, chooses those to pair it with.
+class Partners {
+ public:
+  Partners(const PhotoList& list, const PairOptions& options)
+      : list_(list), options_(options), inFlight_(list.photos.size()) {
+    for (const auto& [flight, photos] : flightsInOrder(list))
+      for (size_t i = 0; i < photos.size(); ++i) inFlight_[static_cast<size_t>(photos[i])] = static_cast<int>(i);
+  }
+
+  std::vector<int> choose(int photo, const std::vector<int>& byOverlap) const {
+    std::vector<int> chosen;
+    std::map<int, int> taken;  // by flight
+    int best = 0, near = 0, more = 0;
+    for (const int other : byOverlap) {
+      const bool isOwnFlight = flight(photo) == flight(other);
+      const bool isNear = isOwnFlight && std::abs(place(photo) - place(other)) <= options_.sequence;
+      const bool isBest = best < options_.partners && !(isNear && near >= options_.near);
+      if (!isBest && (isOwnFlight || taken[flight(other)] >= options_.otherFlight || more >= options_.otherFlights))
+        continue;
+      ++taken[flight(other)];
+      best += isBest ? 1 : 0;
+      near += isNear ? 1 : 0;
+      more += isBest ? 0 : 1;
+      chosen.push_back(other);
+    }
+    return chosen;
+  }
+
+ private:
+  int flight(int photo) const { return list_.photos[static_cast<size_t>(photo)].flight; }
+  int place(int photo) const { return inFlight_[static_cast<size_t>(photo)]; }
+
+  const PhotoList& list_;
+  const PairOptions& options_;
+  std::vector<int> inFlight_;  // the place of each photo in its flight
+};
+
+// Takes a time quadratic in the number of photos, and memory linear in it.
 void pairByFootprint(const PhotoList& list, const std::vector<bool>& tellPlace, const PairOptions& options,
                      std::set<PhotoPair>& pairs) {
   const std::vector<PhotoFootprint> prints = photoFootprints(list, tellPlace);
   const double minCosine = std::cos(options.maxAngle * std::numbers::pi / 180);
-  std::vector<std::vector<Candidate>> candidates(prints.size());
-  std::vector<Candidate> all;
-  for (size_t a = 0; a < prints.size(); ++a) {
-    for (size_t b = a + 1; b < prints.size(); ++b) {
-      const double overlap = sharedShare(prints[a], prints[b]);
-      if (overlap <= 0) continue;
-      const Candidate candidate{overlap, static_cast<int>(a), static_cast<int>(b)};
-      all.push_back(candidate);
-      const double cosine = prints[a].worldFromCamera.col(2).dot(prints[b].worldFromCamera.col(2));
-      if (overlap < options.minOverlap || cosine < minCosine) continue;
-      candidates[a].push_back(candidate);
-      candidates[b].push_back(candidate);
-    }
-  }
-  const auto byOverlap = [](const Candidate& x, const Candidate& y) {
-    return std::tuple(-x.overlap, x.b - x.a, x.a) < std::tuple(-y.overlap, y.b - y.a, y.a);
-  };
   const auto photo = [&](int print) { return prints[static_cast<size_t>(print)].photo; };
-  for (size_t i = 0; i < prints.size(); ++i) {
-    std::sort(candidates[i].begin(), candidates[i].end(), byOverlap);
-    std::map<int, int> taken;  // by flight
-    int count = 0;
-    const int own = list.photos[static_cast<size_t>(prints[i].photo)].flight;
-    for (const Candidate& candidate : candidates[i]) {
-      const int other = candidate.a == static_cast<int>(i) ? candidate.b : candidate.a;
-      const int flight = list.photos[static_cast<size_t>(photo(other))].flight;
-      const bool isBest = count++ < options.partners;
-      if (!isBest && (flight == own || taken[flight] >= options.otherFlight)) continue;
-      ++taken[flight];
-      pairs.insert(inOrder(prints[i].photo, photo(other)));
+  const Partners partners(list, options);
+  SpanningTree tree(prints.size());  // whatever the angles, so that no photo stands alone
+  std::vector<Candidate> candidates;
+  std::vector<int> byOverlap;
+  for (size_t step = 0; step < prints.size(); ++step) {
+    const auto [own, joint] = tree.grow();
+    if (joint.overlap > 0) pairs.insert(inOrder(photo(joint.a), photo(joint.b)));
+    const PhotoFootprint& print = prints[static_cast<size_t>(own)];
+    candidates.clear();
+    for (int i = 0; i < static_cast<int>(prints.size()); ++i) {
+      const PhotoFootprint& other = prints[static_cast<size_t>(i)];
+      const Candidate candidate{i == own ? 0 : sharedShare(print, other), std::min(own, i), std::max(own, i)};
+      if (candidate.overlap <= 0) continue;
+      tree.offer(own, candidate);
+      const double cosine = print.worldFromCamera.col(2).dot(other.worldFromCamera.col(2));
+      if (candidate.overlap >= options.minOverlap && cosine >= minCosine) candidates.push_back(candidate);
     }
-  }
-  // A spanning tree by overlap, whatever the angles, so that no photo stands alone.
-  std::sort(all.begin(), all.end(), byOverlap);
-  std::vector<int> root(prints.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&root](int i) {
-    while (root[static_cast<size_t>(i)] != i)
-      i = root[static_cast<size_t>(i)] = root[static_cast<size_t>(root[static_cast<size_t>(i)])];
-    return i;
-  };
-  for (const Candidate& candidate : all) {
-    const int a = find(candidate.a), b = find(candidate.b);
-    if (a == b) continue;
-    root[static_cast<size_t>(a)] = b;
-    pairs.insert(inOrder(photo(candidate.a), photo(candidate.b)));
+    std::sort(candidates.begin(), candidates.end(), hasMoreOverlap);
+    byOverlap.clear();
+    for (const Candidate& candidate : candidates) byOverlap.push_back(photo(candidate.other(own)));
+    for (const int other : partners.choose(print.photo, byOverlap)) pairs.insert(inOrder(print.photo, other));
   }
 }
 
@@ -149,7 +204,9 @@ std::vector<PhotoPair> chooseMorePairs(const PhotoList& list, const LookAlikes& 
                                        const std::vector<int>& photos) {
   const PairOptions wide{.all = 0,
                          .partners = 40,
+                         .near = 20,
                          .otherFlight = 20,
+                         .otherFlights = 40,
                          .neighbours = 10,
                          .sequence = 40,
                          .lookAlikes = kMaxLookAlikes,

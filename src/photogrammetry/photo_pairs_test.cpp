@@ -67,6 +67,71 @@ TEST(PhotoPairs, ConnectFlightsOfOtherHeightsAndAngles) {
   }
 }
 
+// A photo every three metres: many of the same line overlap more than any of the next one, but show places from nearly
+// the same side.
+TEST(PhotoPairs, ConnectDenseLinesWithTheLinesBesideThem) {
+  PhotoList list;
+  list.bodies = survey(1, 1, 1).bodies;
+  const int perLine = 60;
+  for (int i = 0; i < 4 * perLine; ++i) {
+    const int line = i / perLine, k = i % perLine, column = line % 2 == 0 ? k : perLine - 1 - k;
+    list.photos.push_back(photoAt(3 * column, 25 * line, 60, {90, -90, 0}, 0, 2 * i));
+  }
+  list.flights = 1;
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
+  EXPECT_LE(pairs.size(), 4u * perLine * 12);
+  const int turn = 12;  // photos, where the lines beside one follow it in the sequence
+  for (int i = perLine; i < 3 * perLine; ++i) {
+    if (i % perLine < turn || i % perLine >= perLine - turn) continue;
+    int before = 0, same = 0, after = 0;
+    for (const auto& [a, b] : pairs) {
+      if (a != i && b != i) continue;
+      const int line = (a == i ? b : a) / perLine - i / perLine;
+      ++(line < 0 ? before : line > 0 ? after : same);
+    }
+    EXPECT_GE(before, 2) << i;
+    EXPECT_GE(after, 2) << i;
+    EXPECT_GE(same, 4) << i;
+  }
+}
+
+// A place that is flown over every week.
+TEST(PhotoPairs, StayFewOfManyFlights) {
+  PhotoList list;
+  for (int week = 0; week < 30; ++week) {
+    PhotoList one = survey(4, 4, 15);
+    list.bodies = one.bodies;
+    for (ListedPhoto& photo : one.photos) {
+      photo.flight = week;
+      list.photos.push_back(photo);
+    }
+  }
+  list.flights = 30;
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
+  EXPECT_EQ(groups(list, pairs), 1);
+  EXPECT_LE(pairs.size(), list.photos.size() * (12 + 12 + 4)) << "of 30 each, without a limit on flights";
+}
+
+// Where no pair overlaps enough to be compared for that alone, those that overlap most connect each place.
+TEST(PhotoPairs, ConnectEachPlaceByTheLargestOverlaps) {
+  PhotoList list;
+  list.bodies = survey(1, 1, 1).bodies;
+  const int perLine = 10, perPlace = 3 * perLine;
+  for (int i = 0; i < 2 * perPlace; ++i) {
+    const int place = i / perPlace, line = i % perPlace / perLine, column = i % perLine;
+    // One photo of each place is nearer to the line before its own.
+    const double north = 50 * line - (line == 2 && column == 7 ? 6.5 : 0);
+    list.photos.push_back(photoAt(5000 * place + 65 * column, north, 60, {0, -90, 0}, i, 0));
+  }
+  list.flights = 2 * perPlace;
+  const std::vector<PhotoPair> pairs = choosePairs(list, {}, {.minOverlap = 0.9});
+  EXPECT_EQ(groups(list, pairs), 2);
+  EXPECT_EQ(pairs.size(), 2u * (perPlace - 1)) << "a spanning tree of each place";
+  for (const auto& [a, b] : pairs) EXPECT_TRUE(b - a == 1 || b - a == perLine) << "not aslant: " << a << " " << b;
+  EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(), PhotoPair(17, 27)));
+  EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(), PhotoPair(47, 57)));
+}
+
 TEST(PhotoPairs, AreNotMadeOfPhotosThatLookAway) {
   PhotoList list = survey(7, 7, 15);
   // In the middle of the survey, but the ground that it shows is far to the north.
