@@ -45,10 +45,6 @@ void PhotoModels::discardJoined() const {
     removeFolder(folder_ / name);
 }
 
-void PhotoModels::discardAdjusted() const {
-  removeFolder(folder_ / "adjusted");
-}
-
 fs::path PhotoModels::last(bool adjusted) const {
   std::error_code status;
   if (adjusted && fs::exists(folder_ / "adjusted", status)) return folder_ / "adjusted";
@@ -133,6 +129,7 @@ int PhotoModels::join(const Watch& watch) {
     throw Error(adjusted.string(), "", "lacks photos of the models that were joined",
                 "see joining.log beside it; run again to go on");
   }
+  discardAdjusted();
   replaceFolder(adjusted, folder_ / "joined");
   for (const fs::path& folder : {points, result}) fs::remove_all(folder, status);
   return count;

@@ -43,6 +43,7 @@ class PhotoModels {
   // Adjusts poses, points and lenses together, then again without the observations that disagree with the result.
   // Cameras of many photos get a lens with decentring; if all cameras have many, also a free principal point, which the
   // mapper keeps in the middle: it would be too weakly determined while there are few photos.
+  // Goes on after the adjustments that an interrupted call has finished, unless discardAdjusted() was called.
   void adjust(const Watch& watch);
   void discardAdjusted() const;
 
@@ -62,6 +63,9 @@ class PhotoModels {
   static constexpr size_t kLeastShared = 3;  // photos of models that model_merger joins
 
   fs::path last(bool adjusted) const;
+  // The result of an adjustment that follows so many others, without their outlying observations.
+  fs::path adjustedOnce(int refits) const;
+  void discardBegunAdjustments() const;
   // What the mapper begins with: a model that it goes on from, or a pair of photos.
   struct Beginning {
     fs::path model = {};

@@ -1,4 +1,6 @@
 // The final bundle adjustment of PhotoModels.
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -56,8 +58,25 @@ bool isPlausible(const fs::path& folder, const std::map<uint32_t, size_t>& photo
 
 }  // namespace
 
+void PhotoModels::discardAdjusted() const {
+  discardBegunAdjustments();
+  removeFolder(folder_ / "adjusted");
+}
+
+void PhotoModels::discardBegunAdjustments() const {
+  // The last name is one of former versions.
+  for (const char* name : {"adjusted.begun", "adjusted.partial", "adjusted.refused", "adjusted.result"})
+    removeFolder(folder_ / name);
+  for (int refits = 0; refits <= kRefits; ++refits) removeFolder(adjustedOnce(refits));
+}
+
+fs::path PhotoModels::adjustedOnce(int refits) const {
+  return folder_ / fmt::format("adjusted.{}", refits);
+}
+
 void PhotoModels::adjust(const Watch& watch) {
-  const fs::path input = last(false), partial = folder_ / "adjusted.partial";
+  if (fs::exists(folder_ / "adjusted")) return discardBegunAdjustments();
+  const fs::path input = last(false), begun = folder_ / "adjusted.begun", partial = folder_ / "adjusted.partial";
   // Whole models are held no longer than needed: COLMAP takes much memory meanwhile.
   std::unordered_map<uint32_t, Camera> camerasBefore;
   std::map<uint32_t, size_t> photosByCamera;
@@ -68,13 +87,12 @@ void PhotoModels::adjust(const Watch& watch) {
   }
   const bool allHaveMany = std::all_of(photosByCamera.begin(), photosByCamera.end(),
                                        [](const auto& entry) { return entry.second >= kPhotosForFullLens; });
-  // Returns whether a plausible model results from the one in `begun`; then it is in `partial`.
-  const fs::path begun = folder_ / "adjusted.begun", result = folder_ / "adjusted.result";
-  const auto adjustBegun = [&](bool fullLens) {
-    removeFolder(result);
-    makeFolder(result);
+  // Returns whether a plausible model results from the one in `begun`; then it is in adjustedOnce(refits).
+  const auto adjustBegun = [&](bool fullLens, int refits) {
+    removeFolder(partial);
+    makeFolder(partial);
     try {
-      adjustBundle("adjusting", begun, result, fullLens && allHaveMany,
+      adjustBundle("adjusting", begun, partial, fullLens && allHaveMany,
                    [&] { watch(static_cast<int64_t>(list_.photos.size())); });
     } catch (const ColmapKilled&) {
       throw;
@@ -82,42 +100,47 @@ void PhotoModels::adjust(const Watch& watch) {
       warn("a bundle adjustment is left out: {}", error.what());
       return false;
     }
-    requireWhole(result);
-    if (!isPlausible(result, photosByCamera, camerasBefore)) return false;
-    replaceFolder(result, partial);
+    requireWhole(partial);
+    if (!isPlausible(partial, photosByCamera, camerasBefore)) return false;
+    replaceFolder(partial, adjustedOnce(refits));
     return true;
   };
-  const auto writeInput = [&](bool fullLens) {
+  const auto adjustFirst = [&](bool fullLens) {
     ColmapModel model = readColmapModel(input);
     for (auto& [id, camera] : model.cameras)
       if (fullLens && photosByCamera[id] >= kPhotosForFullLens) camera = withDecentring(camera);
+    removeFolder(begun);
     writeColmapModel(model, begun);
+    return adjustBegun(fullLens, 0);
   };
-  // Returns whether there are any.
-  const auto removeOutlying = [&] {
-    ColmapModel model = readColmapModel(partial);
+  // Returns false also if there are no outlying observations.
+  const auto adjustAgain = [&](bool fullLens, int refits) {
+    ColmapModel model = readColmapModel(adjustedOnce(refits - 1));
     if (removeOutlyingObservations(model) == 0) return false;
+    removeFolder(begun);
     writeColmapModel(model, begun);
-    return true;
+    return adjustBegun(fullLens, refits);
   };
-  removeFolder(begun);
-  removeFolder(partial);
-  writeInput(true);
-  bool fullLens = true, isAdjusted = adjustBegun(true);
-  if (!isAdjusted) {
-    writeInput(false);
-    fullLens = false;
-    isAdjusted = adjustBegun(false);
+  const fs::path refused = folder_ / "adjusted.refused";  // there if a full lens was
+  bool fullLens = !fs::exists(refused);
+  int refits = kRefits;  // of the last adjustment
+  while (refits >= 0 && photosIn(adjustedOnce(refits)).empty()) --refits;
+  if (refits < 0 && fullLens) {
+    fullLens = adjustFirst(true);
+    if (fullLens) refits = 0;
+    if (!fullLens) makeFolder(refused);
   }
-  if (isAdjusted) {
-    for (int i = 0; i < kRefits && removeOutlying() && adjustBegun(fullLens); ++i) {
-    }
+  if (refits < 0 && adjustFirst(false)) refits = 0;
+  if (refits >= 0) {
+    for (; refits < kRefits && adjustAgain(fullLens, refits + 1); ++refits) removeFolder(adjustedOnce(refits));
+    replaceFolder(adjustedOnce(refits), folder_ / "adjusted");
   } else {
     warn("the final bundle adjustment gives no plausible lens; poses stay as they were estimated");
+    removeFolder(partial);
     fs::copy(input, partial);
+    replaceFolder(partial, folder_ / "adjusted");
   }
-  replaceFolder(partial, folder_ / "adjusted");
-  for (const fs::path& folder : {begun, result}) removeFolder(folder);
+  discardBegunAdjustments();
 }
 
 }  // namespace tessera

@@ -405,6 +405,49 @@ TEST_F(PhotoModelsTest, AreAdjustedAgainWithoutObservationsThatDisagree) {
     EXPECT_EQ(image.keypoints.size(), image.id == 3 ? 900u : 1000u) << image.id;
 }
 
+// Killed in the second adjustment.
+TEST_F(PhotoModelsTest, AreAdjustedOnAfterAnInterruption) {
+  const std::string first = prepared("a", numbers(0, 12)), runs = (folder_ / "runs").string();
+  writeColmapModel(withWrongMatches(first), first);
+  const auto countRuns = [&] {
+    const std::string text = readTextFile(folder_ / "runs");
+    return std::count(text.begin(), text.end(), '\n');
+  };
+  PhotoModels estimated =
+      models("case $command in mapper) cp -r " + first + " $output_path/0;;\nbundle_adjuster) echo $input_path >> " +
+             runs + "; [ $(wc -l < " + runs + ") = 2 ] && kill -9 $$; cp $input_path/* $output_path;; esac");
+  for (const bool isNew : {false, true}) {
+    SCOPED_TRACE(isNew ? "a new beginning" : "the first adjustment is not repeated");
+    fs::remove(folder_ / "runs");
+    estimated.map(false, ignore);
+    EXPECT_THROW(estimated.adjust(ignore), ColmapKilled);
+    EXPECT_FALSE(fs::exists(folder_ / "poses/adjusted"));
+    if (isNew) estimated.discardAdjusted();
+    estimated.adjust(ignore);
+    EXPECT_EQ(countRuns(), isNew ? 4 : 3);
+    for (const ColmapModel::Image& image : readColmapModel(folder_ / "poses/adjusted").images)
+      EXPECT_EQ(image.keypoints.size(), image.id == 3 ? 900u : 1000u) << image.id;
+    for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / "poses"))
+      EXPECT_FALSE(entry.path().filename().string().starts_with("adjusted.")) << entry.path();
+    estimated.adjust(ignore);
+    EXPECT_EQ(countRuns(), isNew ? 4 : 3) << "nothing is left to do";
+  }
+}
+
+// Killed after a full lens was refused.
+TEST_F(PhotoModelsTest, AreNotAdjustedAgainWithALensThatWasRefused) {
+  const FakeLens adjusted{4, {627, 628, 700, 298, 0, 0, 0, 0}};
+  const std::string model = prepared("a", numbers(0, 45)), killed = (folder_ / "killed").string();
+  PhotoModels estimated =
+      models("if [ \"$BundleAdjustment_refine_principal_point\" = 0 ] && [ ! -e " + killed + " ]; then touch " +
+             killed + "; kill -9 $$; fi\n" + adjustingScript(model, prepared("adjusted", {0}, adjusted)));
+  estimated.map(false, ignore);
+  EXPECT_THROW(estimated.adjust(ignore), ColmapKilled);
+  estimated.adjust(ignore);
+  EXPECT_EQ(readTextFile(folder_ / "options"), "1\n0\n");
+  EXPECT_EQ(adjustedCamera().lens, LensModel::radial);
+}
+
 TEST_F(PhotoModelsTest, StayAsTheyWereIfWithoutTheseTheyAreNotPlausible) {
   const std::string first = prepared("a", numbers(0, 12)), fewer = prepared("fewer", numbers(0, 11));
   writeColmapModel(withWrongMatches(first), first);
@@ -418,7 +461,7 @@ TEST_F(PhotoModelsTest, StayAsTheyWereIfWithoutTheseTheyAreNotPlausible) {
   EXPECT_EQ(estimated.read().capture.photos.size(), 12u);
   for (const ColmapModel::Image& image : readColmapModel(folder_ / "poses/adjusted").images)
     EXPECT_EQ(image.keypoints.size(), 1000u) << image.id;
-  EXPECT_FALSE(fs::exists(folder_ / "poses/adjusted.result"));
+  EXPECT_FALSE(fs::exists(folder_ / "poses/adjusted.partial"));
 }
 
 }  // namespace
