@@ -329,6 +329,7 @@ Fitted fitTo(const std::vector<Photo>& photos, const std::vector<int>& flights, 
   int known = 0;
   for (const Photo& photo : photos) {
     if (!photo.gps || (heights == Heights::absolute && !photo.gps->hasAltitude)) continue;
+    if (heights == Heights::aboveTakeOff && photo.gps->relativeAltitude == 0) continue;
     const auto flight = flights.empty() ? 0 : static_cast<size_t>(flights[static_cast<size_t>(&photo - photos.data())]);
     if (flight >= fixes.ofFlight.size()) fixes.ofFlight.resize(flight + 1);
     fixes.ofFlight[flight].push_back(static_cast<int>(fixed.size()));
@@ -431,10 +432,13 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
     known += photo.gps->hasAltitude ? 1 : 0;
     relative += photo.gps->relativeAltitude != 0 ? 1 : 0;
   }
-  const bool hasAltitudes = all == 0 || (known > 0 && 2 * known >= all), allRelative = relative == all;
+  // The others may be of another camera, or were taken on the ground.
+  constexpr double kNearlyAll = 0.9;
+  const bool nearlyAllRelative = relative >= kNearlyAll * all;
+  const bool hasAltitudes = all == 0 || (known > 0 && 2 * known >= all);
   const Heights absolute = hasAltitudes ? Heights::absolute : Heights::unknown;
-  Fitted best = fitTo(photos, flights, allRelative ? Heights::aboveTakeOff : absolute, hasAltitudes);
-  if (allRelative && all > 0 && known == all) {
+  Fitted best = fitTo(photos, flights, nearlyAllRelative ? Heights::aboveTakeOff : absolute, hasAltitudes);
+  if (nearlyAllRelative && all > 0 && known == all) {
     constexpr double kClearly = 0.7, kNothing = 0.05;  // share; metres
     Fitted other = fitTo(photos, flights, Heights::absolute, hasAltitudes);
     if (other.result && (!best.result || other.heightError + kNothing < kClearly * best.heightError)) {

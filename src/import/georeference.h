@@ -52,13 +52,13 @@ inline constexpr double kMinGpsSpread = 5;  // metres
 // `reason`, if there are fewer than three fixes, if they lie on one line (the rotation about it is undetermined) or too
 // near one (standard deviation across it below kMinGpsSpread, where the fit would follow noise), if fewer than half of
 // them agree within kGpsTolerance, if those that agree lie so, or if the residual exceeds a third of that deviation.
-// Altitudes are the drone's heights above take-off where every photo has one (its barometer is far more precise than
-// GPS), shifted to agree with the median of the absolute altitudes; but the absolute ones if these fit the poses
-// clearly better, as those of flights that took off at other heights do. Horizontal coordinates and heights count by
-// their deviations from the fit. If only some fixes lack an absolute altitude, they are not used, unless all have
-// heights above take-off. `flights`: the flight of each photo, from 0 on; empty: all are of one. Altitudes of one
-// flight may be wrong by the same height (GPS jumps, and take-off places differ), which is estimated for flights of
-// three fixes or more.
+// Altitudes are the drone's heights above take-off where nine of ten fixes have one (its barometer is far more precise
+// than GPS; the other fixes are not used then), shifted to agree with the median of the absolute altitudes; but the
+// absolute ones if these fit the poses clearly better, as those of flights that took off at other heights do.
+// Horizontal coordinates and heights count by their deviations from the fit. If only some fixes lack an absolute
+// altitude, they are not used, unless all have heights above take-off. `flights`: the flight of each photo, from 0 on;
+// empty: all are of one. Altitudes of one flight may be wrong by the same height (GPS jumps, and take-off places
+// differ), which is estimated for flights of three fixes or more.
 std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,
                                          std::string& reason);
 

@@ -286,20 +286,27 @@ TEST(Georeference, TakesAbsoluteAltitudesIfFlightsTookOffAtOtherHeights) {
   }
 }
 
-// Absolute altitudes that jump from flight to flight, of flights from one place.
+// Absolute altitudes that jump from flight to flight, of flights from one place; also if some photos, as of a phone,
+// state no height above take-off.
 TEST(Georeference, KeepsHeightsAboveTakeOffIfAbsoluteAltitudesJump) {
-  SourceCapture source = flightsUpASlope(true);
-  for (size_t i = 0; i < 150; ++i) {
-    GpsFix& gps = *source.capture.photos[i].gps;
-    gps.relativeAltitude += 12.0 * static_cast<double>(i / 30);
-    gps.altitude += i / 30 % 2 == 0 ? 2 : -2;
+  for (const size_t without : {0, 14, 30}) {
+    SCOPED_TRACE(without);
+    SourceCapture source = flightsUpASlope(true);
+    for (size_t i = 0; i < 150; ++i) {
+      GpsFix& gps = *source.capture.photos[i].gps;
+      gps.relativeAltitude += 12.0 * static_cast<double>(i / 30);
+      gps.altitude += i / 30 % 2 == 0 ? 2 : -2;
+    }
+    for (size_t k = 0; k < without; ++k) source.capture.photos[5 * k].gps->relativeAltitude = 0;
+    scramble(source);
+    std::string reason;
+    const auto fit = georeference(source.capture.photos, source.flight, reason);
+    ASSERT_TRUE(fit.has_value()) << reason;
+    EXPECT_FALSE(fit->ignoresTakeOff);
+    const bool usesTakeOff = without < 15;
+    EXPECT_EQ(fit->fixes, usesTakeOff ? 150 - static_cast<int>(without) : 150);
+    EXPECT_LT(fit->verticalDeviation, 0.1) << "flights are corrected";
   }
-  scramble(source);
-  std::string reason;
-  const auto fit = georeference(source.capture.photos, source.flight, reason);
-  ASSERT_TRUE(fit.has_value()) << reason;
-  EXPECT_FALSE(fit->ignoresTakeOff);
-  EXPECT_LT(fit->verticalDeviation, 0.1);
 }
 
 TEST(Georeference, WorksAcrossTheAntimeridian) {
