@@ -59,6 +59,17 @@ int64_t controlGroupLimit(const fs::path& groups, const fs::path& membership) {
   return lowest;
 }
 
+int64_t availableMemoryBytes() {
+  constexpr const char* kAvailable = "MemAvailable:";
+  std::ifstream lines("/proc/meminfo");
+  std::string name, unit;
+  for (int64_t kibibytes = 0; lines >> name >> kibibytes;) {
+    if (name == kAvailable && kibibytes > 0) return std::min(1024 * kibibytes, usableMemoryBytes());
+    std::getline(lines, unit);
+  }
+  return usableMemoryBytes();
+}
+
 int64_t usableMemoryBytes() {
   const int64_t bytes = static_cast<int64_t>(sysconf(_SC_PHYS_PAGES)) * sysconf(_SC_PAGESIZE);
   const int64_t limit = controlGroupLimit("/sys/fs/cgroup", "/proc/self/cgroup");

@@ -18,6 +18,9 @@ bool restartPeakResidentBytes();
 // that is lower.
 int64_t usableMemoryBytes();
 
+// Returns what other programs leave of it at the moment, by /proc/meminfo; all of it if that does not tell.
+int64_t availableMemoryBytes();
+
 // Returns the lowest limit in bytes of a process's control group and of those around it, or 0 if none has one.
 // `groups`: where they are mounted; `membership`: the process's /proc/PID/cgroup.
 int64_t controlGroupLimit(const fs::path& groups, const fs::path& membership);

@@ -20,6 +20,11 @@ void useMany() {
   ::munmap(memory, kMany);
 }
 
+TEST(Memory, IsPartlyTakenByOtherPrograms) {
+  EXPECT_GT(availableMemoryBytes(), 1 << 20);
+  EXPECT_LE(availableMemoryBytes(), usableMemoryBytes());
+}
+
 TEST(Memory, HasAPeakThatCanBeStartedAgain) {
   const int64_t before = residentBytes();
   ASSERT_GT(before, 0);
