@@ -1,6 +1,7 @@
 #include "import/clean.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -17,12 +18,9 @@ namespace {
 
 PhotoFacts readPhotoFacts(const Photo& photo) {
   PhotoFacts facts;
-  Bytes head;
-  try {
-    head = readPhotoHead(photo.image);
-  } catch (const Error&) {
-    return facts;
-  }
+  std::error_code status;
+  if (!fs::is_regular_file(photo.image, status) || ::access(photo.image.c_str(), R_OK) != 0) return facts;
+  const Bytes head = readPhotoHead(photo.image);
   const auto info = probeImage(head);
   if (!info || info->format == ImageInfo::Format::exr) return facts;
   facts.width = info->width;

@@ -245,10 +245,12 @@ PhotoTags decodePhotoTags(std::span<const std::byte> jpeg) {
 }
 
 Bytes readPhotoHead(const fs::path& file) {
-  constexpr uint64_t kUsual = uint64_t{1} << 20, kMax = uint64_t{1} << 25;
-  Bytes head = readFileStart(file, kUsual);
-  const bool isJpeg = head.size() == kUsual && head[0] == std::byte{0xff} && head[1] == std::byte{0xd8};
-  if (isJpeg && !probeImage(head)) head = readFileStart(file, kMax);
+  Bytes head;
+  for (const uint64_t bytes : {uint64_t{1} << 17, uint64_t{1} << 20, uint64_t{1} << 25}) {
+    head = readFileStart(file, bytes);
+    const bool mayNeedMore = head.size() == bytes && head[0] == std::byte{0xff} && head[1] == std::byte{0xd8};
+    if (!mayNeedMore || probeImage(head)) break;
+  }
   return head;
 }
 

@@ -59,7 +59,7 @@ std::vector<std::optional<double>> comparableStops(std::span<const ExposureTags>
 // of EXIF is another one: programs that correct positions write only there.
 PhotoTags decodePhotoTags(std::span<const std::byte> jpeg);
 
-// Returns the first part of a photo's file, which contains its tags and tells its size: 1 MiB, or up to 32 MiB of a
+// Returns the first part of a photo's file, which contains its tags and tells its size: 128 KiB, or up to 32 MiB of a
 // JPEG whose tags need so much, such as depth maps and thermal pictures. Throws Error if the file cannot be read.
 Bytes readPhotoHead(const fs::path& file);
 

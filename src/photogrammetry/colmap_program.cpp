@@ -37,10 +37,13 @@ ColmapProgram::ColmapProgram(fs::path log, std::string program) : log_(std::move
   const size_t begin = at + 7;
   const std::string version = help.substr(begin, help.find_first_of(" \n", begin) - begin);
   if (version != kColmapVersion) {
-    throw Error(program_, "",
-                fmt::format("is COLMAP {}; only {} has been tested, and others differ in options and files", version,
-                            kColmapVersion),
-                remedy + ", or pose the photos by other means and use `tessera import`");
+    throw Error(
+        program_, "",
+        fmt::format("is COLMAP {}; only {} has been tested, and others differ in options and files", version,
+                    kColmapVersion),
+        fmt::format("put a program `colmap` of version {} first in PATH (Debian 12 has it, and its sources build as "
+                    "tag {}), or pose the photos by other means and use `tessera import`",
+                    kColmapVersion, kColmapVersion));
   }
 }
 

@@ -14,7 +14,9 @@ std::vector<fs::path> filesBelow(const fs::path& folder) {
   std::set<fs::path> seen{fs::weakly_canonical(folder)};
   for (; !status && at != end; at.increment(status)) {
     last = at->path();
-    const bool isHidden = last.filename().string().starts_with(".");
+    const std::string name = last.filename().string();
+    // Network drives by Synology store their previews in @eaDir.
+    const bool isHidden = name.starts_with(".") || name == "@eaDir";
     std::error_code ignored;
     if (at->is_directory(ignored) && (isHidden || !seen.insert(fs::weakly_canonical(last, ignored)).second))
       at.disable_recursion_pending();

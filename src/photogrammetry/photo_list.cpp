@@ -1,12 +1,15 @@
 #include "photogrammetry/photo_list.h"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
+#include <cerrno>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <tuple>
 
@@ -34,11 +37,14 @@ uint64_t contentHash(std::span<const std::byte> bytes) {
   return hash;
 }
 
-std::string extensionInLowerCase(const fs::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
+std::string inLowerCase(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
                  [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return extension;
+  return text;
+}
+
+std::string extensionInLowerCase(const fs::path& path) {
+  return inLowerCase(path.extension().string());
 }
 
 // Photos in formats that only other programs read.
@@ -48,29 +54,66 @@ bool isOtherFormat(const fs::path& path) {
   return extensions.contains(extensionInLowerCase(path));
 }
 
+std::string stemInLowerCase(const fs::path& path) {
+  return inLowerCase(path.stem().string());
+}
+
+// Removes raw pictures that cameras write beside JPEGs of the same name.
+void removeRawTwins(std::vector<fs::path>& files) {
+  const auto place = [](const fs::path& file) { return (file.parent_path() / stemInLowerCase(file)).string(); };
+  std::set<std::string> photos;
+  for (const fs::path& file : files)
+    if (isPhotoName(file)) photos.insert(place(file));
+  std::erase_if(files, [&](const fs::path& file) { return !isPhotoName(file) && photos.contains(place(file)); });
+}
+
 std::vector<fs::path> photoFiles(const fs::path& folder) {
   std::vector<fs::path> files = filesBelow(folder);
   std::erase_if(files, [](const fs::path& file) { return !isPhotoName(file) && !isOtherFormat(file); });
+  removeRawTwins(files);
   return files;
 }
 
 Header readHeader(const fs::path& file) {
   Header header;
-  try {
-    const Bytes head = readPhotoHead(file);
-    std::error_code status;
-    header.fileBytes = fs::file_size(file, status);
-    header.hash = contentHash(head);
-    const auto info = probeImage(head);
-    if (!info || info->format == ImageInfo::Format::exr) return header;
-    // Of a size that a few bytes cannot contain; other programs would take the memory for it.
-    if (!image_codecs::isPlausible(info->width, info->height, header.fileBytes, {})) return header;
-    header.width = info->width;
-    header.height = info->height;
-    header.tags = decodePhotoTags(head);
-  } catch (const Error&) {
-  }
+  if (::access(file.c_str(), R_OK) != 0 && errno == EACCES) return header;
+  // What a disk or a network fails to give for now must not count as a photo that is missing.
+  const Bytes head = readPhotoHead(file);
+  std::error_code status;
+  header.fileBytes = fs::file_size(file, status);
+  header.hash = contentHash(head);
+  const auto info = probeImage(head);
+  if (!info || info->format == ImageInfo::Format::exr) return header;
+  // Of a size that a few bytes cannot contain; other programs would take the memory for it.
+  if (!image_codecs::isPlausible(info->width, info->height, header.fileBytes, {})) return header;
+  header.width = info->width;
+  header.height = info->height;
+  header.tags = decodePhotoTags(head);
   return header;
+}
+
+// Returns whether each file is a smaller copy of another one: the same name elsewhere, taken by the same camera at the
+// same time and place. Those of the same size may be of several cameras that release together.
+std::vector<bool> findCopies(const std::vector<fs::path>& files, const std::vector<Header>& headers) {
+  using Key = std::tuple<std::string, std::string, std::string, std::string, double, double, double, bool, int>;
+  std::map<Key, std::vector<size_t>> alike;
+  for (size_t i = 0; i < files.size(); ++i) {
+    const Header& header = headers[i];
+    const CameraTags& camera = header.tags.camera;
+    if (header.width == 0 || !header.tags.takenAt) continue;
+    const GpsFix gps = header.tags.gps.value_or(GpsFix());
+    const int shape = static_cast<int>(std::lround(10.0 * header.width / header.height));
+    alike[Key(stemInLowerCase(files[i]), camera.make, camera.model, camera.serial, *header.tags.takenAt, gps.latitude,
+              gps.longitude, camera.isThermal, shape)]
+        .push_back(i);
+  }
+  std::vector<bool> isCopy(files.size());
+  for (const auto& [key, group] : alike) {
+    int width = 0;
+    for (const size_t i : group) width = std::max(width, headers[i].width);
+    for (const size_t i : group) isCopy[i] = headers[i].width < width;
+  }
+  return isCopy;
 }
 
 // Gives each photo a name without folders, blanks and characters that mean something to other programs.
@@ -96,6 +139,24 @@ std::string describe(const CameraTags& camera, int width, int height) {
   return fmt::format("{}, {}x{}", name.empty() ? "unknown camera" : name, width, height);
 }
 
+// Returns the altitude from which a drone says that it took off.
+std::optional<double> takeOffAltitude(const PhotoTags& tags) {
+  if (!tags.gps || !tags.gps->hasAltitude || tags.gps->relativeAltitude == 0) return std::nullopt;
+  return tags.gps->altitude - tags.gps->relativeAltitude;
+}
+
+constexpr size_t kTakeOffs = 3;  // photos that tell of a landing, on each side of it
+
+// Whether a drone has landed between photos that state these altitudes of take-off. In flight, they stay as they are,
+// or drift if the absolute altitude is not that of the barometer.
+bool showLanding(const std::vector<double>& before, const std::vector<double>& after) {
+  if (before.size() < kTakeOffs || after.size() < kTakeOffs) return false;
+  const auto [lowest, highest] = std::minmax_element(before.begin(), before.end());
+  const auto [laterLowest, laterHighest] = std::minmax_element(after.begin(), after.end());
+  if (*highest - *lowest > kJumpBetweenFlights || *laterHighest - *laterLowest > kJumpBetweenFlights) return false;
+  return std::max(*laterLowest - *highest, *lowest - *laterHighest) > kJumpBetweenFlights;
+}
+
 void findFlights(PhotoList& list) {
   std::vector<size_t> order(list.photos.size());
   for (size_t i = 0; i < order.size(); ++i) order[i] = i;
@@ -113,13 +174,27 @@ void findFlights(PhotoList& list) {
     return std::tuple(group(a), list.photos[a].tags.takenAt.value_or(0)) <
            std::tuple(group(b), list.photos[b].tags.takenAt.value_or(0));
   });
+  const auto tags = [&](size_t k) -> const PhotoTags& { return list.photos[order[k]].tags; };
+  const auto pauseBefore = [&](size_t k) { return tags(k).takenAt.value_or(0) - tags(k - 1).takenAt.value_or(0); };
+  std::vector<bool> begins(order.size());  // whether a photo is the first of a flight whatever the altitudes
+  for (size_t k = 0; k < order.size(); ++k)
+    begins[k] = k == 0 || group(order[k - 1]) != group(order[k]) || pauseBefore(k) > kPauseBetweenFlights;
+  std::vector<double> before;  // take-off altitudes of the last photos of a flight
   for (size_t k = 0; k < order.size(); ++k) {
-    const bool continues =
-        k > 0 && group(order[k - 1]) == group(order[k]) &&
-        list.photos[order[k]].tags.takenAt.value_or(0) - list.photos[order[k - 1]].tags.takenAt.value_or(0) <=
-            kPauseBetweenFlights;
-    if (!continues) ++list.flights;
+    bool isNext = begins[k];
+    if (!isNext && pauseBefore(k) > kShortestLanding && before.size() == kTakeOffs) {
+      std::vector<double> after;
+      for (size_t i = k; i < order.size() && after.size() < kTakeOffs && (i == k || !begins[i]); ++i)
+        if (const auto altitude = takeOffAltitude(tags(i))) after.push_back(*altitude);
+      isNext = showLanding(before, after);
+    }
+    if (isNext) {
+      ++list.flights;
+      before.clear();
+    }
     list.photos[order[k]].flight = list.flights - 1;
+    if (const auto altitude = takeOffAltitude(tags(k))) before.push_back(*altitude);
+    if (before.size() > kTakeOffs) before.erase(before.begin());
   }
 }
 
@@ -172,6 +247,7 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
   std::set<std::string> safeNames;
   const bool hasVisible = std::any_of(headers.begin(), headers.end(),
                                       [](const Header& h) { return h.width > 0 && !h.tags.camera.isThermal; });
+  const std::vector<bool> isCopy = findCopies(files, headers);
   for (size_t i = 0; i < files.size(); ++i) {
     const Header& header = headers[i];
     const std::string name = files[i].lexically_relative(folder).generic_string();
@@ -197,6 +273,10 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
     }
     if (!seen.emplace(header.fileBytes, header.hash).second) {
       list.leftOut.push_back({name, "the same file as another photo"});
+      continue;
+    }
+    if (isCopy[i]) {
+      list.leftOut.push_back({name, "a smaller copy of another photo"});
       continue;
     }
     const CameraTags& camera = header.tags.camera;

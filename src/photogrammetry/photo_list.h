@@ -23,8 +23,8 @@ struct ListedPhoto {
   std::string safeName;  // unique, without folders and blanks, for programs that such names confuse
   fs::path file;
   int body = 0;  // index into PhotoList::bodies
-  // Photos of one size by one lens on one camera, at any focal length, without a long pause between them, or in one
-  // folder if times are unknown.
+  // Photos of one size by one lens on one camera, at any focal length, without a landing between them, or in one folder
+  // if times are unknown.
   int flight = 0;
   PhotoTags tags;
   fs::path mask = {};  // black where the photo is not used (photo_masks.h); empty: none
@@ -41,11 +41,15 @@ struct PhotoList {
   int flights = 0;
 };
 
-inline constexpr double kPauseBetweenFlights = 300;  // seconds
+// A pause that begins another flight; and a shorter one that does so if the altitude from which the drone says that it
+// took off jumps, as after its battery was exchanged.
+inline constexpr double kPauseBetweenFlights = 300, kShortestLanding = 45;  // seconds
+inline constexpr double kJumpBetweenFlights = 2;                            // metres
 
-// Lists the JPEG and PNG files below a folder. Leaves out files that cannot be read, photos in other formats, copies of
-// other photos, panoramas, and infrared pictures beside visible ones. Hidden files and folders are ignored. Throws
-// Error if the folder cannot be read.
+// Lists the JPEG and PNG files below a folder. Leaves out files that cannot be decoded or may not be opened, photos in
+// other formats, copies of other photos (also smaller ones, by their name, time and place), panoramas, and infrared
+// pictures beside visible ones. Hidden files and folders are ignored, and raw pictures beside photos of the same name.
+// Throws Error if the folder or a file in it cannot be read for now.
 PhotoList listPhotos(const fs::path& folder, ThreadPool& pool);
 
 // Whether this is the name of a picture that is read: JPEG or PNG.

@@ -80,6 +80,47 @@ TEST_F(PhotoLists, ReadPhotosWithMoreThanAMegabyteOfTags) {
   EXPECT_EQ(list.bodies[0].width, 8);
 }
 
+// Cameras write both of each picture.
+TEST_F(PhotoLists, IgnoreRawPicturesBesidePhotos) {
+  write("a/DJI_1.JPG", 1);
+  writeFileAtomically(folder_ / "a/DJI_1.DNG", std::string_view("raw"));
+  writeFileAtomically(folder_ / "a/DJI_2.dng", std::string_view("raw"));
+  writeFileAtomically(folder_ / "b/DJI_1.dng", std::string_view("raw"));
+  const PhotoList list = this->list();
+  EXPECT_EQ(list.photos.size(), 1u);
+  ASSERT_EQ(list.leftOut.size(), 2u);
+  EXPECT_EQ(list.leftOut[0].name, "a/DJI_2.dng");
+  EXPECT_EQ(list.leftOut[1].name, "b/DJI_1.dng");
+}
+
+TEST_F(PhotoLists, LeaveOutSmallerCopies) {
+  const auto write = [&](const std::string& name, int width, int height, double seconds) {
+    const ImageU8 picture(width, height, 3, static_cast<uint8_t>(name.size()));
+    writeFileAtomically(folder_ / name, encodeJpeg(picture, 90, encodeExif({.seconds = seconds})));
+  };
+  write("flight/DJI_1.jpg", 16, 12, 0);
+  write("small/dji_1.JPG", 8, 6, 0);
+  write("other_camera/DJI_1.jpg", 16, 12, 0);  // which releases together with the first
+  write("later/DJI_1.jpg", 8, 6, 60);          // of another flight, whose numbers begin anew
+  write("flight/DJI_2.jpg", 8, 6, 0);          // of a series in one second
+  write("wide/DJI_1.jpg", 8, 4, 0);            // of another shape
+  writeFileAtomically(folder_ / "@eaDir/DJI_1.jpg/SYNOPHOTO_THUMB_XL.jpg", encodeJpeg(ImageU8(4, 3, 3), 90));
+  const PhotoList list = this->list();
+  std::string names;
+  for (const ListedPhoto& photo : list.photos) names += photo.name + " ";
+  EXPECT_EQ(names, "flight/DJI_1.jpg flight/DJI_2.jpg later/DJI_1.jpg other_camera/DJI_1.jpg wide/DJI_1.jpg ");
+  ASSERT_EQ(list.leftOut.size(), 1u);
+  EXPECT_EQ(list.leftOut[0].name, "small/dji_1.JPG");
+  EXPECT_EQ(list.leftOut[0].reason, "a smaller copy of another photo");
+}
+
+// As of a network drive that is away: the photo must not count as one that cannot be decoded.
+TEST_F(PhotoLists, AreNotThoseOfADiskThatFails) {
+  write("one.jpg", 1);
+  fs::create_symlink("/proc/self/mem", folder_ / "two.jpg");  // whose first page cannot be read
+  EXPECT_THROW(list(), Error);
+}
+
 TEST_F(PhotoLists, LeaveOutNamesThatACaptureCannotHave) {
   write("one.jpg", 1);
   write(
@@ -111,6 +152,31 @@ TEST_F(PhotoLists, SeparateFlightsByPauses) {
   EXPECT_EQ(list.photos[4].flight, 1);
   EXPECT_EQ(list.bodies.size(), 1u);
   EXPECT_NEAR(list.bodies[0].focalLength, 28.0 / 36 * 8, 1e-9);
+}
+
+// The battery was exchanged in two minutes.
+TEST_F(PhotoLists, SeparateFlightsByShortLandingsIfTakeOffAltitudesJump) {
+  // Eight photos, of which the last four are taken after a pause; `heights`: above take-off.
+  const auto flights = [this](double pause, const std::vector<double>& altitudes, const std::vector<double>& heights) {
+    for (size_t i = 0; i < 8; ++i) {
+      writeSurveyPhoto(folder_ / ("p" + std::to_string(i) + ".jpg"),
+                       {.gps = {46.5, 6.5, altitudes[i], heights[i]},
+                        .seconds = 3.0 * static_cast<double>(i) + (i >= 4 ? pause : 0)});
+    }
+    return list().flights;
+  };
+  const std::vector<double> high(8, 50.0), unknown(8, 0.0);
+  const std::vector<double> jump{400, 400, 400, 400, 405, 405, 405, 405};
+  EXPECT_EQ(flights(120, jump, high), 2);
+  EXPECT_EQ(list().photos[3].flight, 0);
+  EXPECT_EQ(list().photos[4].flight, 1);
+  EXPECT_EQ(flights(20, jump, high), 1) << "too short to land";
+  EXPECT_EQ(flights(120, jump, unknown), 1) << "it has climbed";
+  EXPECT_EQ(flights(120, {400, 400, 400, 400, 401, 401, 401, 401}, high), 1) << "an error of the barometer";
+  EXPECT_EQ(flights(120, {400, 402, 404, 406, 409, 411, 413, 415}, high), 1) << "absolute altitudes that drift";
+  // A photo on the ground between the two.
+  EXPECT_EQ(flights(120, jump, {50, 50, 50, 50, 0, 50, 50, 50}), 2);
+  EXPECT_EQ(list().photos[4].flight, 1);
 }
 
 TEST_F(PhotoLists, CountZoomAndUprightPicturesToTheSameFlight) {

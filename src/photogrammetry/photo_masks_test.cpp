@@ -17,6 +17,7 @@ class PhotoMasksOf : public testing::Test {
     list_.bodies = {{"drone", 16, 12, 0}};
     for (const char* name : {"a/one.jpg", "a/two.jpg", "b/three.jpg"})
       list_.photos.push_back({name, "safe" + std::to_string(list_.photos.size()) + ".jpg", folder_ / name, 0, 0, {}});
+    for (const ListedPhoto& photo : list_.photos) writeFileAtomically(photo.file, std::string_view("a picture"));
   }
   // Black on the left.
   void writeMask(const std::string& name, int width = 16, int height = 12, int channels = 1) {

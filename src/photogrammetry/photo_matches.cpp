@@ -100,7 +100,7 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
   if (done() < count) {
     int64_t pixels = 0;
     for (const CameraBody& body : list_.bodies) pixels = std::max(pixels, extractedPixels(body));
-    const int threads = extractionThreads(settings_.threads, pixels, usableMemoryBytes());
+    const int threads = extractionThreads(settings_.threads, pixels, availableMemoryBytes());
     std::vector<std::string> arguments{"feature_extractor",
                                        "--database_path",
                                        database().string(),
@@ -113,8 +113,16 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
     ThreadPool pool(settings_.threads);
     if (writeMasks(list_, folder_ / "masks", pool, [&] { watch(0); }))
       arguments.insert(arguments.end(), {"--ImageReader.mask_path", (folder_ / "masks").string()});
-    runColmap(
-        "features", std::move(arguments), [&] { watch(done()); }, [&] { return done() == count; });
+    const auto extract = [&] {
+      runColmap(
+          "features", arguments, [&] { watch(done()); }, [&] { return done() == count; });
+    };
+    extract();
+    // What could not be read then, it may read now.
+    if (missesPhotos()) {
+      extract();
+      missesPhotos();
+    }
   }
   int64_t features = 0;
   for (const auto& [photo, number] : ColmapDatabase(database()).features()) features += number;
@@ -122,6 +130,17 @@ void PhotoMatches::extractFeatures(const Watch& watch) {
     throw Error((folder_ / "images").string(), "", "no photo has features",
                 "check that the photos show something sharp; features.log tells more");
   }
+}
+
+bool PhotoMatches::missesPhotos() const {
+  const std::map<int, int> features = ColmapDatabase(database()).features();
+  bool misses = false;
+  for (int i = 0; i < static_cast<int>(list_.photos.size()); ++i) {
+    if (features.contains(i)) continue;
+    const Bytes file = readFile(list_.photos[static_cast<size_t>(i)].file);
+    misses = misses || decodeImage(file).has_value();
+  }
+  return misses;
 }
 
 LookAlikes PhotoMatches::findLookAlikes(const std::vector<int>& photos, const Watch& watch) {

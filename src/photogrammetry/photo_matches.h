@@ -31,6 +31,8 @@ class PhotoMatches {
   // Called twice a second with the number of photos or pairs that are done. What it throws ends the program that runs.
   using Watch = std::function<void(int64_t done)>;
 
+  // Photos that cannot be decoded get no features. Throws Error if none gets any, or if one cannot be read for now, as
+  // from a disk that is away, which COLMAP passes over.
   void extractFeatures(const Watch& watch);
   // Removes features and matches, which belong to other photos. Throws Error if a file cannot be removed.
   void discard() const;
@@ -51,6 +53,8 @@ class PhotoMatches {
 
  private:
   fs::path database() const { return folder_ / "database.db"; }
+  // Whether the program has left out a photo that can be decoded. Throws Error if one cannot be read.
+  bool missesPhotos() const;
   void runColmap(const char* step, std::vector<std::string> arguments, const std::function<void()>& look,
                  const std::function<bool()>& isDone = {});
 

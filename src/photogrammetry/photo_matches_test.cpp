@@ -1,5 +1,6 @@
 #include "photogrammetry/photo_matches.h"
 
+#include "base/image_io.h"
 #include "photogrammetry/colmap_database.h"
 #include "photogrammetry/testing/fake_colmap.h"
 
@@ -114,6 +115,38 @@ TEST(PhotoMatches, TakeAsManyThreadsAsMemoryAllows) {
   EXPECT_EQ(extractionThreads(16, pixels, 16 * kGiB), 4);
   EXPECT_EQ(extractionThreads(16, pixels, kGiB), 1);
   EXPECT_GE(extractionThreads(0, 800 * 600, 16 * kGiB), 1);
+}
+
+// COLMAP passes over photos that it cannot read, and reports success.
+TEST(PhotoMatches, ReadPhotosAgainThatWereAwayOrSayThatTheyAre) {
+  const TemporaryFolder folder;
+  for (const char* name : {"made.db", "all.db"}) makeDatabase(folder / name);
+  sqlite3* handle = nullptr;
+  ASSERT_EQ(sqlite3_open((folder / "all.db").c_str(), &handle), SQLITE_OK);
+  sqlite3_exec(handle, "INSERT INTO keypoints VALUES(3, 500)", nullptr, nullptr, nullptr);
+  sqlite3_close(handle);
+  PhotoList list = numberedPhotos(3);
+  for (ListedPhoto& photo : list.photos) {
+    photo.file = folder / photo.name;
+    writeJpeg(photo.file, ImageU8(8, 6, 3));
+  }
+  const std::string runs = (folder / "runs").string();
+  // The third photo gets features the second time.
+  const std::string script = "case $command in database_creator) cp " + (folder / "made.db").string() +
+                             " $database_path;; feature_extractor) echo run >> " + runs + "; [ $(wc -l < " + runs +
+                             ") = 2 ] && cp " + (folder / "all.db").string() + " $database_path;; esac; true";
+  const auto extract = [&] {
+    fs::remove(runs);
+    fs::remove_all(folder / "poses");
+    PhotoMatches matches(folder / "poses", list, {.program = writeColmap(folder, script).string()});
+    const std::string message = errorMessage([&] { matches.extractFeatures([](int64_t) {}); });
+    return message + std::to_string(matches.count().photos) + " " + readTextFile(runs);
+  };
+  EXPECT_EQ(extract(), "3 run\nrun\n");
+  writeFileAtomically(list.photos[2].file, std::string_view("damaged"));
+  EXPECT_EQ(extract(), "2 run\n");
+  fs::remove(list.photos[2].file);
+  EXPECT_EQ(extract().find(list.photos[2].file.string() + ": No such file"), 0u) << extract();
 }
 
 // Pair 0 and 2 is in the tables; the script adds another, and fails.
