@@ -30,6 +30,7 @@
 #include "pipeline/run_estimator.h"
 #include "pipeline/run_report.h"
 #include "pipeline/run_request.h"
+#include "pipeline/set_aside.h"
 #include "pipeline/training_planner.h"
 #include "pipeline/verb_process.h"
 
@@ -45,6 +46,15 @@ bool isReadable(const std::function<void()>& read) {
     return true;
   } catch (const Error&) {
     return false;
+  }
+}
+
+// Throws Error if photos of a model are not there any more: without them, the capture would silently be smaller.
+void requirePhotos(const Capture& capture) {
+  for (const Photo& photo : capture.photos) {
+    std::error_code status;
+    if (fs::exists(photo.image, status)) continue;
+    throw Error(photo.image.string(), "", "is not there any more", "bring it back, and run again to go on");
   }
 }
 
@@ -84,7 +94,11 @@ class PhotoRun {
         {.name = "features",
          .settings = masks_ ? textDigest(masks_->describe()) : "",
          .isComplete = has("poses/database.db"),
-         .discard = [this] { matches_->discard(); },
+         .discard =
+             [this] {
+               if (has("poses/adjusted")()) setAside(out("poses"));
+               matches_->discard();
+             },
          .needs = [this](bool resumes) { return estimator_->featureNeeds(resumes); },
          .run = [this](bool) { return features(); }},
         {.name = "pairs",
@@ -117,9 +131,9 @@ class PhotoRun {
          .run = [this](bool) { return adjusting(); }},
         {.name = "georeferencing", .settings = "", .run = [this](bool) { return georeferencing(); }},
         {.name = "capture",
-         .settings = (frames_ && options_.downscale == 0
-                          ? fmt::format("{} {} {:.0f}", options_.method, training, options_.costs.raysPerSecond)
-                          : std::to_string(downscale())) +
+         // The size that was chosen stays the same on another machine.
+         .settings = (options_.downscale > 0 ? std::to_string(options_.downscale)
+                                             : fmt::format("for {} {}", options_.method, training)) +
                      " " + describeHoldOut(options_.holdout) + (posed_ ? " " + posed_->digest() : ""),
          .isComplete = has("capture/transforms.json"),
          .needs =
@@ -131,7 +145,7 @@ class PhotoRun {
         {.name = "train",
          .settings = fmt::format("--method {} {}", options_.method, training),
          .isComplete = has("model/manifest.json"),
-         .discard = [this] { setModelAside(); },
+         .discard = [this] { setAside(out("model")); },
          .needs =
              [this](bool resumes) {
                planner_.expectNewModel();
@@ -236,7 +250,9 @@ class PhotoRun {
   std::string features() {
     Progress progress("features", static_cast<int64_t>(list_.photos.size()), "photos");
     matches_->extractFeatures(watch(progress));
-    return fmt::format("{} photos", list_.photos.size());
+    const auto photos = static_cast<size_t>(matches_->count().photos);
+    const size_t all = list_.photos.size();
+    return photos < all ? fmt::format("{} of {} photos", photos, all) : fmt::format("{} photos", all);
   }
 
   std::string pairs() {
@@ -371,6 +387,7 @@ class PhotoRun {
 
   std::string capture() {
     SourceCapture source = posed_ ? posed_->take(out("poses")) : models_->read();
+    if (!posed_) requirePhotos(source.capture);
     std::set<std::string> dropped;
     const Capture capture = importSource(std::move(source), options_.photos.string(), out("capture"),
                                          {.downscale = downscale(),
@@ -383,17 +400,6 @@ class PhotoRun {
     const std::string size = downscale() > 1 ? fmt::format(", made smaller by {}", downscale()) : "";
     return fmt::format("{} photos, {} held out{}{}", capture.photos.size(), capture.photosIn(Split::test).size(),
                        capture.geo ? ", georeferenced" : "", size);
-  }
-
-  // A model that was trained on something else or in another way is kept beside the new one.
-  void setModelAside() {
-    std::error_code status;
-    if (!fs::exists(out("model"), status)) return;
-    fs::path earlier = out("model.earlier");
-    for (int i = 2; fs::exists(earlier, status); ++i) earlier = out("model.earlier-") += std::to_string(i);
-    fs::rename(out("model"), earlier, status);
-    if (status) throw Error(out("model").string(), "", "cannot be renamed: " + status.message(), "check the disk");
-    inform("{} is kept as {}", out("model").string(), earlier.string());
   }
 
   std::string train() {

@@ -273,6 +273,22 @@ TEST_F(PhotoRuns, OfPosedPhotosReduceThemToASizeThatCanBeTrained) {
   EXPECT_EQ(probeImageFile(options_.out / "capture/images/a1.png").width, 840);
 }
 
+// By the speed of another machine, or of another version of the program, the size would be another one.
+TEST_F(PhotoRuns, KeepTheSizeOfPhotosOnAnotherMachine) {
+  writePosed(3);
+  for (int i = 0; i < 3; ++i)
+    writePng(options_.photos / ("images/a" + std::to_string(i) + ".png"), ImageU8(1200, 900, 3));
+  const auto width = [&] { return probeImageFile(options_.out / "capture/images/a1.png").width; };
+  options_.minutes = 2;
+  run();
+  EXPECT_EQ(width(), 600);
+  options_.costs.raysPerSecond *= 100;
+  EXPECT_TRUE(contains(run(), "capture    finished before"));
+  options_.minutes = 3;
+  EXPECT_FALSE(contains(run(), "capture    finished before"));
+  EXPECT_EQ(width(), 1200);
+}
+
 TEST_F(PhotoRuns, OfPosedPhotosUseTheSplitOfTheSource) {
   writePosed(
       4, R"("train_filenames":["images/a0.png","images/a1.png"],"test_filenames":["images/a2.png","images/a3.png"],)");

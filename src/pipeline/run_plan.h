@@ -101,7 +101,7 @@ inline constexpr int kLongestSide = 1600, kShortestSide = 400;  // pixels of the
 
 // Returns by what width and height of photos are divided so that training, with the usual number of rays a second,
 // passes kVisits times through each pixel: at least until the longer side has at most kLongestSide pixels, and at most
-// until it has kShortestSide. The machine has no influence, so that a run that is repeated gives the same photos.
+// until it has kShortestSide. A GPU trains more rays, and gets larger photos.
 int chooseDownscale(const TrainingSize& size, const TrainingCosts& costs);
 
 // Returns a plan as a table, a line for each stage and one for all.
