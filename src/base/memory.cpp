@@ -59,9 +59,9 @@ int64_t controlGroupLimit(const fs::path& groups, const fs::path& membership) {
   return lowest;
 }
 
-int64_t availableMemoryBytes() {
+int64_t availableMemoryBytes(const fs::path& meminfo) {
   constexpr const char* kAvailable = "MemAvailable:";
-  std::ifstream lines("/proc/meminfo");
+  std::ifstream lines(meminfo);
   std::string name, unit;
   for (int64_t kibibytes = 0; lines >> name >> kibibytes;) {
     if (name == kAvailable && kibibytes > 0) return std::min(1024 * kibibytes, usableMemoryBytes());

@@ -18,8 +18,8 @@ bool restartPeakResidentBytes();
 // that is lower.
 int64_t usableMemoryBytes();
 
-// Returns what other programs leave of it at the moment, by /proc/meminfo; all of it if that does not tell.
-int64_t availableMemoryBytes();
+// Returns what other programs on the machine leave of it at the moment; all of it if `meminfo` (proc(5)) does not tell.
+int64_t availableMemoryBytes(const fs::path& meminfo = "/proc/meminfo");
 
 // Returns the lowest limit in bytes of a process's control group and of those around it, or 0 if none has one.
 // `groups`: where they are mounted; `membership`: the process's /proc/PID/cgroup.
