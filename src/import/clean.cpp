@@ -1,7 +1,6 @@
 #include "import/clean.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cmath>
@@ -12,14 +11,14 @@
 #include "base/file.h"
 #include "base/image_io.h"
 #include "base/log.h"
+#include "base/readable_file.h"
 
 namespace tessera {
 namespace {
 
 PhotoFacts readPhotoFacts(const Photo& photo) {
   PhotoFacts facts;
-  std::error_code status;
-  if (!fs::is_regular_file(photo.image, status) || ::access(photo.image.c_str(), R_OK) != 0) return facts;
+  if (!isReadableFile(photo.image)) return facts;
   const Bytes head = readPhotoHead(photo.image);
   const auto info = probeImage(head);
   if (!info || info->format == ImageInfo::Format::exr) return facts;

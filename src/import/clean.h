@@ -24,7 +24,7 @@ void keepPhotos(SourceCapture& source, const std::vector<size_t>& order);
 // Reads the header of every photo; drops missing, unreadable and repeated photos and those whose aspect ratio differs
 // from their camera's; scales the lens of photos whose size differs from their camera's; sorts in natural name order.
 // Sets Photo::gps from the photo's tags where the source had none. Returns the facts of the remaining photos, in their
-// new order.
+// new order. Throws Error if a disk fails to read a photo that is there.
 std::vector<PhotoFacts> cleanSource(SourceCapture& source, ThreadPool& pool);
 
 // Returns the first names and, where there are more, an ellipsis: "a.jpg, b.jpg, c.jpg, ...".

@@ -425,12 +425,14 @@ GeoFrame frameAround(const std::vector<GpsFix>& fixes) {
 std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,
                                          std::string& reason) {
   CHECK((flights.empty() || flights.size() == photos.size()));
-  int all = 0, known = 0, relative = 0;  // fixes, those with absolute altitudes, and with heights above take-off
+  // Fixes, those with absolute altitudes, with heights above take-off, and with both.
+  int all = 0, known = 0, relative = 0, both = 0;
   for (const Photo& photo : photos) {
     if (!photo.gps) continue;
     ++all;
     known += photo.gps->hasAltitude ? 1 : 0;
     relative += photo.gps->relativeAltitude != 0 ? 1 : 0;
+    both += photo.gps->hasAltitude && photo.gps->relativeAltitude != 0 ? 1 : 0;
   }
   // The others may be of another camera, or were taken on the ground.
   constexpr double kNearlyAll = 0.9;
@@ -438,7 +440,7 @@ std::optional<Georeference> georeference(const std::vector<Photo>& photos, const
   const bool hasAltitudes = all == 0 || (known > 0 && 2 * known >= all);
   const Heights absolute = hasAltitudes ? Heights::absolute : Heights::unknown;
   Fitted best = fitTo(photos, flights, nearlyAllRelative ? Heights::aboveTakeOff : absolute, hasAltitudes);
-  if (nearlyAllRelative && all > 0 && known == all) {
+  if (nearlyAllRelative && all > 0 && both == relative) {
     constexpr double kClearly = 0.7, kNothing = 0.05;  // share; metres
     Fitted other = fitTo(photos, flights, Heights::absolute, hasAltitudes);
     if (other.result && (!best.result || other.heightError + kNothing < kClearly * best.heightError)) {

@@ -32,7 +32,7 @@ struct Georeference {
   int inliers = 0, fixes = 0;
   double rmsMetres = 0;                // of the inliers, in three dimensions
   std::vector<double> heightsTooHigh;  // by flight: metres by which its altitudes are too high, corrected
-  std::vector<Residual> residuals;     // of all fixes
+  std::vector<Residual> residuals;     // of the fixes that are used
   // Standard deviations of a fix, metres: of each horizontal coordinate, and of the height, from the residuals.
   double horizontalDeviation = 0, verticalDeviation = 0;
   // Standard errors of the similarity, if the errors of fixes are independent (those of a flight seldom are: it is then
@@ -56,7 +56,7 @@ inline constexpr double kMinGpsSpread = 5;  // metres
 // than GPS; the other fixes are not used then), shifted to agree with the median of the absolute altitudes; but the
 // absolute ones if these fit the poses clearly better, as those of flights that took off at other heights do.
 // Horizontal coordinates and heights count by their deviations from the fit. If only some fixes lack an absolute
-// altitude, they are not used, unless all have heights above take-off. `flights`: the flight of each photo, from 0 on;
+// altitude, they are not used, unless heights above take-off are. `flights`: the flight of each photo, from 0 on;
 // empty: all are of one. Altitudes of one flight may be wrong by the same height (GPS jumps, and take-off places
 // differ), which is estimated for flights of three fixes or more.
 std::optional<Georeference> georeference(const std::vector<Photo>& photos, const std::vector<int>& flights,

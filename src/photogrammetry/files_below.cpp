@@ -3,6 +3,7 @@
 #include <set>
 
 #include "base/error.h"
+#include "base/readable_file.h"
 
 namespace tessera {
 
@@ -20,7 +21,10 @@ std::vector<fs::path> filesBelow(const fs::path& folder) {
     std::error_code ignored;
     if (at->is_directory(ignored) && (isHidden || !seen.insert(fs::weakly_canonical(last, ignored)).second))
       at.disable_recursion_pending();
-    if (!isHidden && at->is_regular_file(ignored)) files.push_back(last);
+    std::error_code ofFile;
+    if (!isHidden && at->is_regular_file(ofFile)) files.push_back(last);
+    if (!isHidden && ofFile && !meansAbsence(ofFile))
+      throw Error(last.string(), "", "cannot be read: " + ofFile.message(), "check the disk");
   }
   if (status) throw Error(last.string(), "", "cannot be listed: " + status.message(), "make it readable, or remove it");
   return files;

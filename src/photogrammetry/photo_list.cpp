@@ -1,11 +1,9 @@
 #include "photogrammetry/photo_list.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cctype>
-#include <cerrno>
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -14,9 +12,11 @@
 #include <tuple>
 
 #include "base/error.h"
+#include "base/file_digest.h"
 #include "base/image_codecs.h"
 #include "base/image_io.h"
 #include "base/log.h"
+#include "base/readable_file.h"
 #include "import/clean.h"
 #include "photogrammetry/files_below.h"
 
@@ -58,7 +58,7 @@ std::string stemInLowerCase(const fs::path& path) {
   return inLowerCase(path.stem().string());
 }
 
-// Removes raw pictures that cameras write beside JPEGs of the same name.
+// Removes pictures in other formats beside photos of the same name, such as raw ones.
 void removeRawTwins(std::vector<fs::path>& files) {
   const auto place = [](const fs::path& file) { return (file.parent_path() / stemInLowerCase(file)).string(); };
   std::set<std::string> photos;
@@ -76,7 +76,7 @@ std::vector<fs::path> photoFiles(const fs::path& folder) {
 
 Header readHeader(const fs::path& file) {
   Header header;
-  if (::access(file.c_str(), R_OK) != 0 && errno == EACCES) return header;
+  if (!isReadableFile(file)) return header;
   // What a disk or a network fails to give for now must not count as a photo that is missing.
   const Bytes head = readPhotoHead(file);
   std::error_code status;
@@ -243,7 +243,7 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
 
   PhotoList list;
   std::map<std::string, int> bodies;
-  std::set<std::pair<uint64_t, uint64_t>> seen;
+  std::map<std::pair<uint64_t, uint64_t>, fs::path> seen;
   std::set<std::string> safeNames;
   const bool hasVisible = std::any_of(headers.begin(), headers.end(),
                                       [](const Header& h) { return h.width > 0 && !h.tags.camera.isThermal; });
@@ -271,7 +271,8 @@ PhotoList listPhotos(const fs::path& folder, ThreadPool& pool) {
       list.leftOut.push_back({name, "infrared"});
       continue;
     }
-    if (!seen.emplace(header.fileBytes, header.hash).second) {
+    const auto [same, isNew] = seen.try_emplace({header.fileBytes, header.hash}, files[i]);
+    if (!isNew && fileDigest(same->second) == fileDigest(files[i])) {
       list.leftOut.push_back({name, "the same file as another photo"});
       continue;
     }

@@ -48,8 +48,8 @@ inline constexpr double kJumpBetweenFlights = 2;                            // m
 
 // Lists the JPEG and PNG files below a folder. Leaves out files that cannot be decoded or may not be opened, photos in
 // other formats, copies of other photos (also smaller ones, by their name, time and place), panoramas, and infrared
-// pictures beside visible ones. Hidden files and folders are ignored, and raw pictures beside photos of the same name.
-// Throws Error if the folder or a file in it cannot be read for now.
+// pictures beside visible ones. Hidden files and folders are ignored, and pictures in other formats beside photos of
+// the same name. Throws Error if the folder or a file in it cannot be read for now.
 PhotoList listPhotos(const fs::path& folder, ThreadPool& pool);
 
 // Whether this is the name of a picture that is read: JPEG or PNG.

@@ -117,7 +117,7 @@ TEST_F(PhotoLists, LeaveOutSmallerCopies) {
 // As of a network drive that is away: the photo must not count as one that cannot be decoded.
 TEST_F(PhotoLists, AreNotThoseOfADiskThatFails) {
   write("one.jpg", 1);
-  fs::create_symlink("/proc/self/mem", folder_ / "two.jpg");  // whose first page cannot be read
+  fs::create_symlink("/proc/self/mem", folder_ / "two.jpg");  // which cannot be read
   EXPECT_THROW(list(), Error);
 }
 
