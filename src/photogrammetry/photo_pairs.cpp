@@ -104,11 +104,13 @@ class Partners {
   std::vector<int> choose(int photo, const std::vector<int>& byOverlap) const {
     std::vector<int> chosen;
     std::map<int, int> taken;  // by flight
+    std::vector<int> skipped;  // near ones, for want of others
     int best = 0, near = 0, more = 0;
     for (const int other : byOverlap) {
       const bool isOwnFlight = flight(photo) == flight(other);
       const bool isNear = isOwnFlight && std::abs(place(photo) - place(other)) <= options_.sequence;
       const bool isBest = best < options_.partners && !(isNear && near >= options_.near);
+      if (isNear && !isBest) skipped.push_back(other);
       if (!isBest && (isOwnFlight || taken[flight(other)] >= options_.otherFlight || more >= options_.otherFlights))
         continue;
       ++taken[flight(other)];
@@ -117,6 +119,9 @@ class Partners {
       more += isBest ? 0 : 1;
       chosen.push_back(other);
     }
+    const auto left = static_cast<size_t>(std::max(0, options_.partners - best));
+    skipped.resize(std::min(skipped.size(), left));
+    chosen.insert(chosen.end(), skipped.begin(), skipped.end());
     return chosen;
   }
 

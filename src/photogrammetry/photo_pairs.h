@@ -16,7 +16,7 @@ using PhotoPair = std::pair<int, int>;  // indices into PhotoList::photos, the s
 struct PairOptions {
   int all = 40;             // up to so many photos, all pairs
   int partners = 12;        // with how many others a photo is paired by overlap
-  int near = 6;             // of these, at most so many of those that `sequence` counts: lines may be dense
+  int near = 6;             // of these, at most so many of those that `sequence` counts, if others overlap
   int otherFlight = 2;      // with how many photos of each other flight that overlaps
   int otherFlights = 12;    // with how many photos in all for the sake of other flights, beside the partners
   int neighbours = 2;       // in the sequence of a flight, to each side

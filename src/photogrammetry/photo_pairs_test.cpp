@@ -95,6 +95,17 @@ TEST(PhotoPairs, ConnectDenseLinesWithTheLinesBesideThem) {
   }
 }
 
+// As along a road: there is nothing beside the line.
+TEST(PhotoPairs, AreNoFewerOfASingleLine) {
+  PhotoList list;
+  list.bodies = survey(1, 1, 1).bodies;
+  for (int i = 0; i < 80; ++i) list.photos.push_back(photoAt(6 * i, 0, 60, {90, -90, 0}, 0, 2 * i));
+  list.flights = 1;
+  const std::vector<PhotoPair> pairs = choosePairs(list, {});
+  for (int apart = 1; apart <= 6; ++apart)
+    EXPECT_TRUE(std::binary_search(pairs.begin(), pairs.end(), PhotoPair(40, 40 + apart))) << apart;
+}
+
 // A place that is flown over every week.
 TEST(PhotoPairs, StayFewOfManyFlights) {
   PhotoList list;
