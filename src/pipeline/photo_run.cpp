@@ -96,8 +96,8 @@ class PhotoRun {
          .isComplete = has("poses/database.db"),
          .discard =
              [this] {
-               if (has("poses/adjusted")()) setAside(out("poses"));
                matches_->discard();
+               if (has("poses/adjusted")()) setAside(out("poses"));
              },
          .needs = [this](bool resumes) { return estimator_->featureNeeds(resumes); },
          .run = [this](bool) { return features(); }},
@@ -136,11 +136,7 @@ class PhotoRun {
                                              : fmt::format("for {} {}", options_.method, training)) +
                      " " + describeHoldOut(options_.holdout) + (posed_ ? " " + posed_->digest() : ""),
          .isComplete = has("capture/transforms.json"),
-         .needs =
-             [this](bool) {
-               planner_.expectNewCapture();
-               return planner_.needs().capture;
-             },
+         .needs = [this](bool resumes) { return planner_.captureNeeds(resumes); },
          .run = [this](bool) { return capture(); }},
         {.name = "train",
          .settings = fmt::format("--method {} {}", options_.method, training),

@@ -13,6 +13,7 @@
 #include "pipeline/georeference_json.h"
 #include "pipeline/left_out_json.h"
 #include "pipeline/posed_source.h"
+#include "pipeline/training_planner.h"
 
 namespace tessera {
 namespace {
@@ -287,6 +288,17 @@ TEST_F(PhotoRuns, KeepTheSizeOfPhotosOnAnotherMachine) {
   options_.minutes = 3;
   EXPECT_FALSE(contains(run(), "capture    finished before"));
   EXPECT_EQ(width(), 1200);
+}
+
+TEST_F(PhotoRuns, PlanForThePhotosOfACaptureThatIsKept) {
+  writePosed(9);
+  options_.downscale = 2;
+  run();
+  TrainingSize size{.photos = 9, .photoPixels = 16 * 12, .minutes = 1};
+  TrainingPlanner planner(options_, {[&] { return size; }, [] { return std::nullopt; }, [] { return 1; }, false});
+  const double seconds = planner.needs().bake.seconds;
+  size.photoPixels = 8 * 6;
+  EXPECT_EQ(seconds, planTraining(size, options_.costs).bake.seconds);
 }
 
 TEST_F(PhotoRuns, OfPosedPhotosUseTheSplitOfTheSource) {

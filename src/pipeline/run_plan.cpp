@@ -174,7 +174,7 @@ MatchingNeeds planMatching(const MatchingSize& size, const MatchingRates& rates)
       size.inliers > 0 ? static_cast<double>(size.inliers) : pairs * rates.inliersPerPair * kOfNeighbours;
   const auto bytes = [](double each, double count) { return static_cast<int64_t>(each * count); };
   MatchingNeeds needs;
-  const int extracting = extractionThreads(size.threads, size.pixels, availableMemoryBytes());
+  const int extracting = extractionThreads(size.threads, size.pixels, usableMemoryBytes());
   // The few photos that were tried cannot keep more threads busy than they are.
   const double parallel =
       static_cast<double>(extracting) / static_cast<double>(std::min(static_cast<int>(kProbed), extracting));

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "base/error.h"
+#include "base/folder_size.h"
 #include "eval/html.h"
 #include "eval/report_style.h"
 #include "import/exif.h"
@@ -69,18 +70,6 @@ HeldOutResult readEvaluation(const fs::path& file) {
       !json["views"].is_array())
     throw damaged;
   return {number("psnr"), number("ssim"), json["exposure"].get<std::string>(), json["views"].size()};
-}
-
-uint64_t bytesBelow(const fs::path& folder) {
-  uint64_t bytes = 0;
-  std::error_code status;
-  for (fs::recursive_directory_iterator at(folder, status), end; !status && at != end; at.increment(status)) {
-    std::error_code ignored;
-    if (!at->is_regular_file(ignored)) continue;
-    const uint64_t size = at->file_size(ignored);
-    if (!ignored) bytes += size;
-  }
-  return bytes;
 }
 
 std::string formatBytes(double bytes) {

@@ -23,18 +23,21 @@ class TrainingPlanner {
   TrainingPlanner(const PhotoRunOptions& options, Source source);
 
   TrainingNeeds needs();
+  // `resumes`: without the disk that the files of an interrupted capture take already.
+  StageNeeds captureNeeds(bool resumes);
   // `resumes`: what is left of the training of the model that is there.
   StageNeeds trainNeeds(bool resumes);
 
-  // The plan asks for the stages that are not finished in their order: so it tells which results will be replaced.
-  void expectNewCapture() { isCaptureKept_ = false; }
+  // The plan asks for the stages that are not finished in their order: so it tells which results will be replaced, as
+  // captureNeeds() does.
   void expectNewModel() { isModelKept_ = false; }
   void captureIsWritten();
   void modelIsTrained() { isModelKept_ = true; }
   void photosAreListed() { costs_.reset(); }
 
  private:
-  std::optional<Capture> expectedCapture() const;
+  std::optional<Capture> keptCapture() const;
+  std::optional<Capture> expectedCapture() const;  // before there is one
   const TrainingCosts& costs();
   double shareTrained() const;  // of the finest level
 
@@ -42,6 +45,7 @@ class TrainingPlanner {
   Source source_;
   bool isCaptureKept_ = true, isModelKept_ = true;
   std::optional<TrainingCosts> costs_;
+  int64_t capturePixels_ = 0;  // of a photo of the capture that is kept; 0: not known
 };
 
 }  // namespace tessera
