@@ -85,7 +85,9 @@ TEST_F(VolumeCommandLine, PredictsExposuresWhereExifExplainsThem) {
   writeFileAtomically(transforms, capture.dump());
   const Said imported = run({"import", at("jittered"), at("by-exif")});
   ASSERT_EQ(imported.exitCode, 0) << imported.err;
-  for (const json& frame : json::parse(readTextFile(fs::path(at("by-exif")) / "transforms.json"))["frames"]) {
+  const json byExif = json::parse(readTextFile(fs::path(at("by-exif")) / "transforms.json"));
+  ASSERT_EQ(byExif["frames"].size(), exposures.size());
+  for (const json& frame : byExif["frames"]) {
     const std::string name = fs::path(frame["file_path"].get<std::string>()).stem();
     EXPECT_NEAR(frame["tessera"]["exposure"].get<double>(), exposures.at(name), 0.01) << name;
   }
